@@ -39,8 +39,7 @@ from fsw.link.services.service import LinkService
 from fsw.link.sim_link import SimLink
 from fsw.link.vehicle_link import Pacing, VehicleLink
 from fsw.link.wire.outgoing import TelemetryContext
-from fsw.log.flight_log import LogSubject, vehicle_facts
-from fsw.log.run_files import RunFiles
+from fsw.log.flight_log import LogSubject, RunFiles, vehicle_facts
 from fsw.runtime import clock, report
 from fsw.runtime.console import Console
 from fsw.runtime.flight_loop import START_US, Ending, FlightEnd, FlightLoop, FlightRecord

@@ -1,6 +1,6 @@
 """Reading a telemetry log (``.tlog``): a time and a MAVLink frame, again and again.
 
-Source: what QGroundControl and MAVProxy write, and ``fsw/log/run_files.py``.
+Source: what QGroundControl and MAVProxy write, and ``fsw/log/flight_log.py``.
 """
 
 from __future__ import annotations

@@ -511,6 +511,10 @@ class CommandRequest:
         """Who sent it."""
         return self.source_system, self.source_component
 
+    def answer(self, result: int) -> CommandAck:
+        """The acknowledgement to its sender, a MAV_RESULT."""
+        return CommandAck(self.command, result, *self.sender)
+
 
 @dataclass(frozen=True, slots=True)
 class Command:

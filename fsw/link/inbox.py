@@ -214,9 +214,7 @@ class Inbox:
         if answered >= _MAX_PUT_OFF:
             return None
         self._put_off[link] = answered + 1
-        result = CommandResult.TEMPORARILY_REJECTED
-        sender = (request.source_system, request.source_component)
-        return CommandAck(request.command, result, *sender)
+        return request.answer(CommandResult.TEMPORARILY_REJECTED)
 
     def _target(self, frame: Frame) -> None:
         values = cast(Numbers, frame.payload_values)

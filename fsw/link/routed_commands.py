@@ -64,7 +64,7 @@ class RoutedCommands:
             sender = (ack.target_system, ack.target_component)
             one = self._waiting.pop((ack.command, *sender), None)
             if one is not None:
-                found.append(_answer(one.request, ack.result))
+                found.append(one.request.answer(ack.result))
         return found
 
     def given_up(self, t_us: int) -> list[CommandAck]:
@@ -76,16 +76,12 @@ class RoutedCommands:
         ]
         for key, _ in over:
             del self._waiting[key]
-        return [_answer(request, CommandResult.FAILED) for _, request in over]
+        return [request.answer(CommandResult.FAILED) for _, request in over]
 
 
 def _name(request: CommandRequest) -> tuple[int, int]:
     """The sender, as a frame can say it; pymavlink's component is 0 unless it is told another."""
     return request.source_system or _NAMELESS, request.source_component or _NAMELESS
-
-
-def _answer(request: CommandRequest, result: int) -> CommandAck:
-    return CommandAck(request.command, result, request.source_system, request.source_component)
 
 
 def _frame(request: CommandRequest, confirmation: int) -> bytes:

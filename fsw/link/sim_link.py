@@ -263,10 +263,7 @@ class SimLink:
                 request = decode.command_long(frame)
                 if request.command == CMD_REBOOT_SHUTDOWN and request.params[1] == _POWER_OFF:
                     self.shutdown = True
-                    ack = CommandAck(
-                        CMD_REBOOT_SHUTDOWN, ACCEPTED, frame.system_id, frame.component_id
-                    )
-                    self._endpoint.send(self._ack_frame(ack))
+                    self._endpoint.send(self._ack_frame(request.answer(ACCEPTED)))
 
     def _replies(self, texts: tuple[StatusText, ...]) -> list[bytes]:
         frames = [self._ack_frame(ack) for ack in self._acks]

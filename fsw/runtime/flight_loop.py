@@ -34,7 +34,7 @@ from fsw.autopilot.signals import (
 from fsw.link.ground_links import GroundLinks
 from fsw.link.inbox import Inbox
 from fsw.link.vehicle_link import Pacing, VehicleLink
-from fsw.log.run_files import RunFiles
+from fsw.log.flight_log import RunFiles
 from fsw.runtime.clock import unix_us
 from fsw.runtime.host_watch import HostWatch
 from fsw.runtime.planner_service import PlannerRecord

@@ -12,7 +12,7 @@ from fsw.autopilot.flight.failsafe.evidence import JUMP_US, MISSED_TICKS
 from fsw.autopilot.ports import Clock
 from fsw.autopilot.signals import HostHealth
 from fsw.link.ground_links import GroundLinks
-from fsw.log.run_files import RunFiles
+from fsw.log.flight_log import RunFiles
 
 _FEW: Final = 100  # datagrams/s; fewer are not worth a number
 _ENOUGH_S: Final = 60.0  # for which a disk should take the log

@@ -21,7 +21,7 @@ from benchmarks.soak import (
     stood_still,
 )
 from benchmarks.soak_client import Client
-from fsw.log.run_files import TlogWriter
+from fsw.log.flight_log import TlogWriter
 from messages import dialect
 from messages.frames import FrameWriter
 

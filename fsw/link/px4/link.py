@@ -345,14 +345,7 @@ class Px4Link:
 
     def route(self, request: CommandRequest) -> None:
         """A real vehicle lets nothing fail on command."""
-        self.routed_acks.append(
-            CommandAck(
-                request.command,
-                CommandResult.UNSUPPORTED,
-                request.source_system,
-                request.source_component,
-            )
-        )
+        self.routed_acks.append(request.answer(CommandResult.UNSUPPORTED))
 
     def as_json(self) -> dict[str, object]:
         """What was found out about the link."""

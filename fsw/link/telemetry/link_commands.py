@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from typing import Final
 
 from fsw.autopilot.signals import (
-    CommandAck,
     CommandRequest,
     CommandResult,
     FlightSnapshot,
@@ -70,8 +69,7 @@ class LinkCommands:
         if outcome is None:
             return None
         result, reason, messages = outcome
-        ack = CommandAck(request.command, result, request.source_system, request.source_component)
-        reply = Outgoing(message_ids.COMMAND_ACK, command_ack(ack))
+        reply = Outgoing(message_ids.COMMAND_ACK, command_ack(request.answer(result)))
         texts = [StatusText(Severity.INFO, reason, prompt=True)] if reason else []
         return (reply, *messages, *texts)
 

@@ -19,8 +19,7 @@ import pytest
 from pyulog import ULog
 
 from fsw.autopilot.signals import SensorFrame, TickInputs
-from fsw.log.flight_log import FlightLog
-from fsw.log.run_files import RunFiles
+from fsw.log.flight_log import FlightLog, RunFiles
 from messages.block_file import BlockFile
 from pandion.logged_ticks import Gap, LoggedTick, open_flight, ticks
 from tests.fsw.link.snapshots import outputs_at

@@ -11,7 +11,7 @@ import pytest
 from pymavlink import mavutil
 
 from command_line.run_directory import new_run_directory
-from fsw.log.run_files import TlogWriter
+from fsw.log.flight_log import TlogWriter
 from messages.frames import FrameWriter
 from tests.waiting import wait_for
 
@@ -46,7 +46,7 @@ def test_a_flight_is_never_written_over_another(tmp_path: Path) -> None:
 KILLED = """
 import sys, time
 from pathlib import Path
-from fsw.log.run_files import TlogWriter
+from fsw.log.flight_log import TlogWriter
 from messages.frames import FrameWriter
 log, writer = TlogWriter(Path(sys.argv[1]), 1_700_000_000_000_000), FrameWriter(1, 1)
 for tick in range(5000):

@@ -27,9 +27,15 @@ from fsw.autopilot.signals import (
     StatusText,
     Vec3,
 )
-from fsw.link.services.mission_remarks import fence_remarks, mission_remarks
 from fsw.link.services.mission_service import MissionService
-from fsw.link.services.mission_store import WAITING, Kind, MissionStore, Site
+from fsw.link.services.mission_store import (
+    WAITING,
+    Kind,
+    MissionStore,
+    Site,
+    fence_remarks,
+    mission_remarks,
+)
 from fsw.link.wire.mission_items import MissionItem
 from tests.fsw.link.ground import Ground, ground_station, station_socket
 from tests.fsw.link.services.mission_client import Client, Item, Weather
