@@ -62,11 +62,8 @@ class OpenEndpoint:
     @property
     def dropped(self) -> int | None:
         """Datagrams that found no room in the kernel; None where it does not count them."""
-        return self._drops() if self._socket.fileno() >= 0 else self._dropped
-
-    def _drops(self) -> int | None:
-        if sys.platform != "linux":
-            return None
+        if sys.platform != "linux" or self._socket.fileno() < 0:
+            return self._dropped
         try:
             counts = self._socket.getsockopt(socket.SOL_SOCKET, _SO_MEMINFO, _MEMINFO.size)
             return int(_MEMINFO.unpack(counts)[-1])

@@ -76,14 +76,11 @@ def addresses(choice: LinkChoice) -> tuple[LinkAddress, LinkAddress | None]:
     """
     api = None if choice.api == NO_LINK else parse_link_address(choice.api)
     gcs = parse_link_address(choice.gcs)
-    if api == gcs or (api is not None and _line(api) is not None and _line(api) == _line(gcs)):
+    # Two links cannot both speak on one serial line, whatever its speed.
+    lines = [one.device for one in (api, gcs) if isinstance(one, SerialLine)]
+    if api == gcs or len(set(lines)) < len(lines):
         raise LinkError(
             f"--gcs {choice.gcs} and --api {choice.api} are the same; "
             "give them different ports or lines"
         )
     return gcs, api
-
-
-def _line(address: LinkAddress) -> str | None:
-    """The device of a serial line, of which two links cannot both speak."""
-    return address.device if isinstance(address, SerialLine) else None

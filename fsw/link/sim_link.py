@@ -165,7 +165,9 @@ class SimLink:
         frames = split(datagram)
         found = {frame.message_id: frame for frame in frames}  # of each kind the last one
         if message_ids.HEARTBEAT in found:
-            self._note_pacing(cast(int, found[message_ids.HEARTBEAT].payload_values[0]))
+            custom_mode = cast(int, found[message_ids.HEARTBEAT].payload_values[0])
+            self.pacing = Pacing(custom_mode & _LOCKSTEP_BIT)
+            self.measured = bool(custom_mode & _MEASURED_BIT)
         barrier = found.get(message_ids.HIL_SENSOR)
         if barrier is None or barrier.payload_values[_SENSOR_AT] != 0:
             self._read_between_steps(frames)
@@ -213,10 +215,6 @@ class SimLink:
 
     def _note_what_is_odd(self, sentence: str) -> None:
         self.notices.append(StatusText(Severity.WARNING, sentence))
-
-    def _note_pacing(self, custom_mode: int) -> None:
-        self.pacing = Pacing(custom_mode & _LOCKSTEP_BIT)
-        self.measured = bool(custom_mode & _MEASURED_BIT)
 
     def _new(self, barrier: Frame, odometry: Frame | None, arm: Frame | None) -> SensorFrame | None:
         """The sensors of a step that is whole and not known yet; a known one is answered again."""

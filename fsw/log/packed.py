@@ -43,11 +43,6 @@ class Packed:
             return self._struct.pack(*map(_within_float, entries))
 
 
-def _sampled_us(one: Sample) -> int:
-    """When it was measured [us]; 0 before the clock began or where that is not known."""
-    return round(1e6 * one.time) if 0.0 <= one.time < _LATEST else 0
-
-
 class _Codec:
     """Records of one kind of sample."""
 
@@ -71,7 +66,9 @@ class _Codec:
             else:
                 values.append(value)
         if self._is_stamped:
-            values.append(_sampled_us(sample))
+            # In whole microseconds; 0 before the clock began or where that is not known.
+            time = sample.time
+            values.append(round(1e6 * time) if 0.0 <= time < _LATEST else 0)
         return values
 
     def read(self, body: bytes) -> Sample:

@@ -64,10 +64,6 @@ class ReleaseSchedule:
         """When the current release is or was due [us, monotonic]."""
         return round(self.start_us + self.index * self.period_us)
 
-    def shift(self, shift_us: float) -> None:
-        """Move all coming releases by ``shift_us`` [us]: the sensors' clock differs from ours."""
-        self.start_us += shift_us
-
 
 class DeadlineMonitor:
     """Collects missed releases, and warns when they matter to the operator."""
@@ -204,7 +200,8 @@ class ScheduledReleases:
             arrived = self._vehicle.wait(1e-6 * max(due_us - self._clock(), 0))
             early_us = due_us - self._clock() if arrived else 0
             shift_us = _GAIN * (LEAD_US - early_us)
-            schedule.shift(min(max(shift_us, -_MAX_SHIFT_US), _MAX_SHIFT_US))
+            # All coming releases move: the sensors' clock differs from ours.
+            schedule.start_us += min(max(shift_us, -_MAX_SHIFT_US), _MAX_SHIFT_US)
         self._sleep_until(due_us)
 
     def _sleep_until(self, until_us: int) -> None:

@@ -79,21 +79,17 @@ def vehicle_files(logs: FlightLogs) -> Directory:
     """
     dated = _LaidOut(logs, _by_day)
     px4 = {"log": dated, "fs": {"microsd": {"log": dated}}}
-    return {"logs": _LaidOut(logs, _by_name), **_metadata_files(), **px4}
-
-
-def _can_be_listed(name: str) -> bool:
-    return name.isascii() and name.isprintable() and len(name) <= _MAX_NAME
-
-
-def _metadata_files() -> dict[str, Node]:
-    """The documents, by their names in the root of the tree."""
     # Made now, so that no tick has to: it takes longer than six of them.
-    return {
+    metadata = {
         _GENERAL: MemoryFile(_general()[0]),
         _PARAMETERS: MemoryFile(_parameters()),
         _EVENTS: MemoryFile(event_document()),
     }
+    return {"logs": _LaidOut(logs, _by_name), **metadata, **px4}
+
+
+def _can_be_listed(name: str) -> bool:
+    return name.isascii() and name.isprintable() and len(name) <= _MAX_NAME
 
 
 def component_metadata(

@@ -89,7 +89,7 @@ class SampleDecoder:
         if updated & _RESET:
             return found
         if updated & _INERTIAL == _INERTIAL:
-            found.append(inertial_sample(values))
+            found.append(ImuSample(time, cast(Vec3, values[1:4]), cast(Vec3, values[4:7])))
         if updated & _MAGNETIC == _MAGNETIC:
             found.append(MagneticSample(time, cast(Vec3, values[7:10])))
         if updated & _PRESSURE:
@@ -118,11 +118,6 @@ def battery_reading(values: Numbers) -> BatteryReading | None:
     if millivolts == _UNKNOWN_VOLTAGE or not 0 <= percent <= 100:
         return None
     return BatteryReading(1e-3 * millivolts, 1e-2 * percent)
-
-
-def inertial_sample(values: Numbers) -> ImuSample:
-    """The inertial unit's part of a HIL_SENSOR."""
-    return ImuSample(1e-6 * values[0], cast(Vec3, values[1:4]), cast(Vec3, values[4:7]))
 
 
 def pose_sample(values: Numbers) -> PoseSample | None:

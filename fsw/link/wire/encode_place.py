@@ -40,7 +40,7 @@ def global_position(snapshot: FlightSnapshot, context: TelemetryContext) -> Wire
     """GLOBAL_POSITION_INT of the body origin."""
     estimate = snapshot.estimate
     latitude, longitude, altitude = _scaled(to_global(context.origin, estimate.p_WB))
-    vx, vy, vz = (_int16(100.0 * v) for v in estimate.v_WB)
+    vx, vy, vz = (min(max(round(100.0 * v), -_I16), _I16) for v in estimate.v_WB)
     heading = round(100.0 * _degrees(estimate.yaw)) % 36000
     above = round(1000.0 * _above_home(snapshot))
     return (boot_ms(snapshot.t_us), latitude, longitude, altitude, above, vx, vy, vz, heading)
@@ -174,7 +174,3 @@ def _degrees(yaw: float) -> float:
 def _at_most(value: float, most: int) -> int:
     """A rounded number within a field; 0, which is unknown, for what is none."""
     return min(round(value), most) if math.isfinite(value) else 0
-
-
-def _int16(value: float) -> int:
-    return min(max(round(value), -_I16), _I16)

@@ -189,10 +189,6 @@ def _waypoint(item: MissionItem, locate: Locate) -> MissionStep:
     return _go(item, place, hold, acceptance or USUAL_ACCEPTANCE)
 
 
-def _loiter_time(item: MissionItem, locate: Locate) -> MissionStep:
-    return _loiter(item, locate, _stay(item, "a stay"))
-
-
 def _loiter_to_height(item: MissionItem, locate: Locate) -> MissionStep:
     """Radius and exit are a fixed wing's: parameter 4 is no heading here."""
     return _loiter(replace(item, params=(*item.params[:3], math.nan)), locate, 0.0)
@@ -322,7 +318,9 @@ _MAX_HEADING: Final = math.degrees(MAX_YAW)
 _READERS: Final[dict[int, Callable[[MissionItem, Locate], MissionStep]]] = {
     dialect.MAV_CMD_NAV_WAYPOINT: _waypoint,
     dialect.MAV_CMD_NAV_LOITER_UNLIM: lambda item, locate: _loiter(item, locate, math.inf),
-    dialect.MAV_CMD_NAV_LOITER_TIME: _loiter_time,
+    dialect.MAV_CMD_NAV_LOITER_TIME: lambda item, locate: _loiter(
+        item, locate, _stay(item, "a stay")
+    ),
     dialect.MAV_CMD_NAV_LOITER_TURNS: _loiter_turns,
     dialect.MAV_CMD_NAV_LOITER_TO_ALT: _loiter_to_height,
     dialect.MAV_CMD_DO_JUMP: _jump,
