@@ -19,7 +19,7 @@ from benchmarks.two_processes import figures, fly
 from command_line.options import json_file, option, read
 from command_line.output import console_beside, json_text, print_error, write_text
 from command_line.values import number
-from fsw.link.files.flight_logs import MARK
+from fsw.link.files.vehicle_files import MARK
 from pandion.display import Display
 from pandion.supervisor import ProcessFailed
 

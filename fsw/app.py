@@ -24,12 +24,11 @@ from fsw.arguments import FswOptions
 from fsw.autopilot.ports import PlanningCycle
 from fsw.autopilot.tuning import Tuning
 from fsw.link.endpoints import LinkError, parse_address
-from fsw.link.events.event_service import EventService
-from fsw.link.files.flight_logs import FlightLogs
+from fsw.link.events import EventService
 from fsw.link.files.ftp_service import FtpService
 from fsw.link.files.log_service import LogService
 from fsw.link.files.log_stream import LogStreamService
-from fsw.link.files.vehicle_files import vehicle_files
+from fsw.link.files.vehicle_files import FlightLogs, vehicle_files
 from fsw.link.ground_links import build_links
 from fsw.link.inbox import Inbox
 from fsw.link.link_choice import AUTOPILOTS, addresses

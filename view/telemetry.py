@@ -21,7 +21,7 @@ from fsw.autopilot.signals import (
     Vec3,
     Zone,
 )
-from fsw.link.events.event_table import condition_of
+from fsw.link.events import condition_of
 from fsw.link.wire import decode
 from fsw.link.wire.identity import AVAILABLE_MODES
 from fsw.link.wire.zone_transfer import ZoneTransfer

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Final
 from xml.etree import ElementTree as ET
 
-from fsw.link.events.event_service import EventService
+from fsw.link.events import EventService
 from fsw.link.files.ftp_service import FtpService
 from fsw.link.files.log_service import LogService
 from fsw.link.files.log_stream import LogStreamService

@@ -25,8 +25,7 @@ from fsw.link.outbox import Outbox, packed
 from fsw.link.peers import Arrivals, Peers
 from fsw.link.services.service import Dispatch, LinkService
 from fsw.link.signing.signing import FrameTrust, Signing, set_up_signing
-from fsw.link.telemetry.link_commands import LinkCommands
-from fsw.link.telemetry.stream_rates import TELEMETRY, LineBudget, StreamRates
+from fsw.link.telemetry.stream_rates import TELEMETRY, LineBudget, LinkCommands, StreamRates
 from fsw.link.telemetry.streams import AT_ONCE, HEARTBEAT, STREAMS, Stream
 from fsw.link.wire.decode import for_this_vehicle
 from fsw.link.wire.encode_standard import command_ack
@@ -142,7 +141,7 @@ class GcsLink:
     @property
     def is_heard(self) -> bool:
         """Whether it has a client."""
-        return bool(self.peers.heard_us)
+        return bool(self.peers.last_received_us)
 
     def fileno(self) -> int:
         """The socket, to wait for."""
@@ -223,8 +222,8 @@ class GcsLink:
             self._housekeeping_us = snapshot.t_us + _HOUSEKEEPING_US
             self.outbox.add_overdue_texts(snapshot.t_us)
             self.peers.expire(self._clock())
-            self.rates.heard_by(frozenset(self.peers.heard_us))
-            self.talks = self._unheard or bool(self.peers.heard_us)
+            self.rates.heard_by(frozenset(self.peers.last_received_us))
+            self.talks = self._unheard or bool(self.peers.last_received_us)
             if self._line is not None:
                 self.rates.fit()
 

@@ -8,7 +8,7 @@ from typing import Final
 from fsw.autopilot.signals import StatusText
 from fsw.link.signing.signing import Signing
 from fsw.link.text_limiter import TextLimiter
-from fsw.link.wire.outgoing import Outgoing, ServiceOutput, WireValues
+from fsw.link.wire.outgoing import ServiceOutput, WireValues
 from messages import message_ids, status_text
 from messages.frames import FrameWriter
 from messages.message_ids import AUTOPILOT, PANDION, SYSTEM_ID
@@ -47,11 +47,11 @@ class Outbox:
         if isinstance(outgoing, StatusText):
             self.add_text(outgoing, t_us)
             return
-        if isinstance(outgoing, Outgoing):
-            self.add(outgoing.component, outgoing.message_id, outgoing.values)
-            return
-        writer = self._writers[outgoing.component]
-        self._add_frame(writer.packed_frame(outgoing.message_id, outgoing.payload))
+        component, message_id, values = outgoing.component, outgoing.message_id, outgoing.values
+        if isinstance(values, bytes):
+            self._add_frame(self._writers[component].packed_frame(message_id, values))
+        else:
+            self.add(component, message_id, values)
 
     def add_asked_for(self, outgoing: ServiceOutput, t_us: int) -> None:
         """Take a requested message: in MAVLink 2 if MAVLink 1 has no such message.

@@ -35,33 +35,35 @@ class Peers:
         self.all: tuple[Address, ...] = (configured,)
         self.version_1: frozenset[Address] = frozenset()  # of these, those whose last frame was so
         self._configured = configured
-        self.heard_us: dict[Address, int] = {}  # of those that speak, in the order they came
+        self.last_received_us: dict[
+            Address, int
+        ] = {}  # of those that speak, in the order they came
 
     def heard(self, peer: Address, now_us: int, *, version_1: bool = False) -> None:
         """Note a peer that has just sent a valid frame, of MAVLink 1 or 2."""
         if version_1 != (peer in self.version_1):
             self.version_1 ^= {peer}
-        known = peer in self.heard_us
-        self.heard_us[peer] = now_us
+        known = peer in self.last_received_us
+        self.last_received_us[peer] = now_us
         if known:
             return
-        learnt = [other for other in self.heard_us if other != self._configured]
+        learnt = [other for other in self.last_received_us if other != self._configured]
         if len(learnt) > _MAX_LEARNT:
-            quiet = min(learnt[:-1], key=self.heard_us.__getitem__)
-            is_silent = now_us - self.heard_us[quiet] > _QUIET_US
-            del self.heard_us[quiet if is_silent else learnt[-2]]
+            quiet = min(learnt[:-1], key=self.last_received_us.__getitem__)
+            is_silent = now_us - self.last_received_us[quiet] > _QUIET_US
+            del self.last_received_us[quiet if is_silent else learnt[-2]]
         self._list()
 
     def expire(self, now_us: int) -> None:
         """Remove peers that have been silent for too long; call it once a second."""
-        silent = [peer for peer, at in self.heard_us.items() if now_us - at > EXPIRY_US]
+        silent = [peer for peer, at in self.last_received_us.items() if now_us - at > EXPIRY_US]
         for peer in silent:
-            del self.heard_us[peer]
+            del self.last_received_us[peer]
         if silent:
             self._list()
 
     def _list(self) -> None:
-        learnt = (peer for peer in self.heard_us if peer != self._configured)
+        learnt = (peer for peer in self.last_received_us if peer != self._configured)
         self.all = (self._configured, *learnt)
         self.version_1 &= set(self.all)
 

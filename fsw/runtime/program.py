@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final, TypeAlias
 from fsw.autopilot.periods import TICK_US
 from fsw.autopilot.ports import PlanningCycle, VehicleFacts
 from fsw.autopilot.signals import Severity, StatusText, TickInputs, TickOutputs
-from fsw.link.events.event_service import EventLog
+from fsw.link.events import EventLog
 from fsw.link.services.mission_store import MissionStore
 
 if TYPE_CHECKING:

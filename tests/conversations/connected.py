@@ -19,11 +19,10 @@ from fsw.autopilot.geometry.geodesy import to_local
 from fsw.autopilot.parameters.flight_config import FlightConfig
 from fsw.autopilot.ports import LoopHealth
 from fsw.link.bounded_memory import SentFrames
-from fsw.link.files.flight_logs import FlightLogs
 from fsw.link.files.ftp_service import FtpService
 from fsw.link.files.log_service import LogService
 from fsw.link.files.log_stream import LogStreamService
-from fsw.link.files.vehicle_files import vehicle_files
+from fsw.link.files.vehicle_files import FlightLogs, vehicle_files
 from fsw.link.gcs_link import GcsLink, LinkSetup
 from fsw.link.ground_links import GroundLinks
 from fsw.link.inbox import Inbox

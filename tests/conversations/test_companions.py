@@ -15,7 +15,7 @@ import pytest
 
 from fsw.autopilot.parameters.flight_config import flight_config
 from fsw.autopilot.parameters.param_type import field_of, value_of
-from fsw.link.files.flight_logs import MARK
+from fsw.link.files.vehicle_files import MARK
 from messages import dialect as d
 from tests.conversations.connected import PARAMETER_FILE, Connected, Message, connected
 from tests.conversations.table import Must, Turn, ack, play

@@ -16,7 +16,7 @@ import pytest
 from fsw.autopilot.parameters.flight_config import flight_config
 from fsw.autopilot.parameters.param_type import value_of
 from fsw.autopilot.signals import MissionState, Mode
-from fsw.link.files.flight_logs import MARK
+from fsw.link.files.vehicle_files import MARK
 from fsw.link.wire.identity import AVAILABLE_MODES
 from messages import dialect as d
 from tests.conversations.connected import PARAMETER_FILE, Connected, connected

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from fsw.link.files.flight_logs import MARK
+from fsw.link.files.vehicle_files import MARK
 from tests.interop.vehicle import Vehicle, parameter_file, standing_vehicle
 
 EARLIER = random.Random(4).randbytes(90 * 1000)  # of the size that ends with a full LOG_DATA

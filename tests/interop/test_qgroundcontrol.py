@@ -21,7 +21,7 @@ import pytest
 from fsw.autopilot.parameters.metadata import metadata_crc, parameter_document
 from fsw.autopilot.parameters.param_type import value_of
 from fsw.autopilot.parameters.registry import PARAMETERS
-from fsw.link.events.event_table import event_document
+from fsw.link.events import event_document
 from fsw.storage.parameter_file import load
 from messages import dialect
 from tests.interop.station import PATIENCE_S, Station

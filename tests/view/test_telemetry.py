@@ -24,7 +24,7 @@ from fsw.autopilot.signals import (
     Severity,
     Zone,
 )
-from fsw.link.events.event_table import ARGUMENTS, failsafe_event
+from fsw.link.events import ARGUMENTS, failsafe_event
 from fsw.link.telemetry.streams import STREAMS, messages_now
 from fsw.link.wire.outgoing import Outgoing, TelemetryContext
 from messages import message_ids as ids

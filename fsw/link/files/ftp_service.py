@@ -17,7 +17,7 @@ from fsw.link.files import ftp_jobs
 from fsw.link.files.ftp_jobs import MAX_DATA, MAX_FILE, Job, Reply, Request, refused
 from fsw.link.files.served_file import Directory, Node, OpenFile
 from fsw.link.services.service import LinkService
-from fsw.link.wire.outgoing import PackedOutgoing
+from fsw.link.wire.outgoing import Outgoing
 from messages import dialect, message_ids
 from messages.frames import Frame
 
@@ -51,7 +51,7 @@ class _Answered:
     """A request that must run once only, because it opens or closes a session."""
 
     payload: bytes
-    answer: PackedOutgoing
+    answer: Outgoing
     t_us: int
 
 
@@ -83,7 +83,7 @@ class FtpService(LinkService):
             dialect.MAV_FTP_OPCODE_CALCFILECRC: self._checksum,
         }
 
-    def handle(self, frame: Frame, t_us: int) -> Sequence[PackedOutgoing]:
+    def handle(self, frame: Frame, t_us: int) -> Sequence[Outgoing]:
         """Answer a request, or start the job that will."""
         _, _, _, *payload = cast("tuple[int, ...]", frame.payload_values)
         client, packed = (frame.system_id, frame.component_id), bytes(payload)
@@ -102,11 +102,11 @@ class FtpService(LinkService):
             renew(self._answered, client, _Answered(packed, answer, t_us), _MAX_REMEMBERED)
         return [answer]
 
-    def poll(self, t_us: int) -> Sequence[PackedOutgoing]:
+    def poll(self, t_us: int) -> Sequence[Outgoing]:
         """Go on with the jobs, each in its turn."""
         return self._go_on(list(self._jobs), _FRAMES) if self._jobs else ()
 
-    def bulk(self, t_us: int) -> Sequence[PackedOutgoing]:
+    def bulk(self, t_us: int) -> Sequence[Outgoing]:
         """Go on with the bursts: after each the client asks for the next one."""
         if not self._jobs:
             return ()
@@ -114,8 +114,8 @@ class FtpService(LinkService):
         bursts = [key for key, one in self._jobs.items() if one.request.opcode == burst]
         return self._go_on(bursts, _DATAGRAM_FRAMES)
 
-    def _go_on(self, ready: list[_Key], frames: int) -> list[PackedOutgoing]:
-        answers: list[PackedOutgoing] = []
+    def _go_on(self, ready: list[_Key], frames: int) -> list[Outgoing]:
+        answers: list[Outgoing] = []
         while ready and len(answers) < frames:
             key = ready.pop(0)
             running = self._jobs.pop(key)
@@ -245,9 +245,9 @@ class FtpService(LinkService):
         self._sessions.pop(key).file.close()
 
 
-def _outgoing(reply: Reply, request: Request, sequence: int, client: Client) -> PackedOutgoing:
+def _outgoing(reply: Reply, request: Request, sequence: int, client: Client) -> Outgoing:
     payload = bytes((0, *client)) + ftp_jobs.write_reply(reply, request, sequence)
-    return PackedOutgoing(message_ids.FILE_TRANSFER_PROTOCOL, payload)
+    return Outgoing(message_ids.FILE_TRANSFER_PROTOCOL, payload)
 
 
 def find(root: Directory, path: bytes) -> Node | None:

@@ -14,11 +14,11 @@ from collections.abc import Sequence
 from typing import Final, NamedTuple, cast
 
 from fsw.autopilot.signals import Severity, StatusText
-from fsw.link.files.flight_logs import Erasure, FlightLogs
 from fsw.link.files.served_file import OpenFile
+from fsw.link.files.vehicle_files import Erasure, FlightLogs
 from fsw.link.services.service import LinkService
 from fsw.link.wire.decode import Numbers
-from fsw.link.wire.outgoing import Outgoing, PackedOutgoing, ServiceOutput
+from fsw.link.wire.outgoing import Outgoing, ServiceOutput
 from messages import message_ids
 from messages.frames import Frame
 
@@ -146,7 +146,7 @@ class LogService(LinkService):
                 _Request(log_id=log_id, offset=offset, end=end, closed=closed, paced=paced)
             )
 
-    def _data(self, frames: int) -> list[PackedOutgoing]:
+    def _data(self, frames: int) -> list[Outgoing]:
         """The next LOG_DATA of the first request; none while the disk has not delivered."""
         request = self._requests[0]
         log_id, offset, end = request.log_id, request.offset, request.end
@@ -197,6 +197,6 @@ def _erasure_text(erasure: Erasure) -> StatusText:
     return StatusText(Severity.WARNING, f"{text}; {erasure.failed} could not be: {erasure.reason}")
 
 
-def _log_data(log_id: int, offset: int, data: bytes) -> PackedOutgoing:
+def _log_data(log_id: int, offset: int, data: bytes) -> Outgoing:
     payload = _LOG_DATA.pack(offset, log_id, len(data), data)
-    return PackedOutgoing(message_ids.LOG_DATA, payload)
+    return Outgoing(message_ids.LOG_DATA, payload)

@@ -15,10 +15,10 @@ from collections.abc import Sequence
 from typing import Final, cast
 
 from fsw.autopilot.signals import CommandRequest, CommandResult, Severity, StatusText
-from fsw.link.files.flight_logs import FlightLogs
 from fsw.link.files.served_file import DiskFile, OpenFile
+from fsw.link.files.vehicle_files import FlightLogs
 from fsw.link.services.service import LinkService, Outcome
-from fsw.link.wire.outgoing import PackedOutgoing, ServiceOutput
+from fsw.link.wire.outgoing import Outgoing, ServiceOutput
 from messages import message_ids
 from messages.frames import Frame
 
@@ -56,7 +56,7 @@ class LogStreamService(LinkService):
         self._offset = 0  # of the next piece
         self._boundary = _FILE_HEAD  # where the next message begins whose size is not known yet
         self._data_begin: int | None = None  # where the definitions end, once that is known
-        self._awaited: PackedOutgoing | None = None  # the piece to be acknowledged
+        self._awaited: Outgoing | None = None  # the piece to be acknowledged
         self._tries, self._next_us = 0, 0
 
     def carry_out(self, request: CommandRequest, t_us: int, armed: bool) -> Outcome:
@@ -116,7 +116,7 @@ class LogStreamService(LinkService):
         self._tries, self._next_us = self._tries + 1, t_us + _AGAIN_US
         return (self._awaited,)
 
-    def _piece(self, t_us: int) -> PackedOutgoing | None:
+    def _piece(self, t_us: int) -> Outgoing | None:
         """The next piece; None while it is not on the disk."""
         assert self._client is not None
         try:
@@ -131,7 +131,7 @@ class LogStreamService(LinkService):
         kind = message_ids.LOGGING_DATA_ACKED if acked else message_ids.LOGGING_DATA
         payload = _DATA.pack(self._sequence, *self._client, PIECE, begins, found[:PIECE])
         self._offset += PIECE
-        return PackedOutgoing(kind, payload)
+        return Outgoing(kind, payload)
 
     def _read(self, t_us: int) -> bytes:
         """The next piece and the head of a message that begins at its end, if they are there."""

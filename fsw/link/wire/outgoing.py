@@ -37,18 +37,9 @@ class Outgoing:
     """A message to send to the peers of the link."""
 
     message_id: int
-    values: WireValues
+    values: WireValues | bytes  # bytes: its whole payload, packed already, as of files
     component: int = AUTOPILOT  # whose sequence it counts in
 
 
-@dataclass(frozen=True, slots=True)
-class PackedOutgoing:
-    """The same with its payload packed already: the bytes of a file, of which there are many."""
-
-    message_id: int
-    payload: bytes  # all of it
-    component: int = AUTOPILOT
-
-
-ServiceOutput = Outgoing | PackedOutgoing | StatusText
+ServiceOutput = Outgoing | StatusText
 """What a service sends: messages, and texts for the operator."""

@@ -13,11 +13,10 @@ from typing import Any
 from fsw.autopilot.parameters.flight_config import FlightConfig
 from fsw.autopilot.signals import Vec3
 from fsw.link.bounded_memory import SentFrames
-from fsw.link.files.flight_logs import FlightLogs
 from fsw.link.files.ftp_service import FtpService
 from fsw.link.files.log_service import LogService
 from fsw.link.files.log_stream import LogStreamService
-from fsw.link.files.vehicle_files import vehicle_files
+from fsw.link.files.vehicle_files import FlightLogs, vehicle_files
 from fsw.link.gcs_link import GcsLink, LinkSetup
 from fsw.link.ground_links import GroundLinks
 from fsw.link.inbox import Inbox

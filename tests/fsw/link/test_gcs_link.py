@@ -20,8 +20,8 @@ from pymavlink.dialects.v10 import common as old_protocol
 from fsw.autopilot.ports import LinkLosses
 from fsw.autopilot.signals import BatteryState, CommandAck, Mode, Severity, StatusText
 from fsw.link.bounded_memory import SentFrames
-from fsw.link.files.flight_logs import FlightLogs
 from fsw.link.files.log_service import LogService
+from fsw.link.files.vehicle_files import FlightLogs
 from fsw.link.peers import EXPIRY_US
 from fsw.link.services.service import LinkService, TimeService
 from fsw.link.telemetry.streams import AT_ONCE, STREAMS

@@ -13,8 +13,8 @@ import pytest
 
 from fsw.autopilot.parameters.flight_config import FlightConfig
 from fsw.link.bounded_memory import SentFrames
-from fsw.link.files.flight_logs import FlightLogs
 from fsw.link.files.log_service import LogService
+from fsw.link.files.vehicle_files import FlightLogs
 from fsw.link.gcs_link import GcsLink, LinkSetup
 from fsw.link.ground_links import GroundLinks
 from fsw.link.inbox import Inbox

@@ -23,10 +23,11 @@ from fsw.autopilot.signals import (
     StatusText,
     TickInputs,
 )
-from fsw.link.events.event_service import EventLog, EventService
-from fsw.link.events.event_table import (
+from fsw.link.events import (
     ARGUMENTS,
     Event,
+    EventLog,
+    EventService,
     arming_events,
     condition_of,
     event_document,

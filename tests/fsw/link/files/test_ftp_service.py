@@ -14,12 +14,11 @@ from pathlib import Path
 
 import pytest
 
-from fsw.link.files.flight_logs import MARK, FlightLogs
 from fsw.link.files.ftp_jobs import MAX_DATA
 from fsw.link.files.ftp_service import FtpService
 from fsw.link.files.served_file import Directory, DiskFile, MemoryFile
-from fsw.link.files.vehicle_files import _parameters, vehicle_files
-from fsw.link.wire.outgoing import PackedOutgoing
+from fsw.link.files.vehicle_files import MARK, FlightLogs, _parameters, vehicle_files
+from fsw.link.wire.outgoing import Outgoing
 from messages import dialect
 from messages import message_ids as ids
 from messages.frames import FrameWriter, split
@@ -48,7 +47,7 @@ class ServiceOutput:
         return self.data[0] if self.opcode == dialect.MAV_FTP_OPCODE_NAK else None
 
 
-def decoded(outgoing: PackedOutgoing) -> ServiceOutput:
+def decoded(outgoing: Outgoing) -> ServiceOutput:
     assert outgoing.message_id == ids.FILE_TRANSFER_PROTOCOL
     network, system, component, *payload = (int(value) for value in values_of(outgoing))
     assert network == 0

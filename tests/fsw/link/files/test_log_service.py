@@ -12,9 +12,8 @@ from pathlib import Path
 import pytest
 
 from fsw.autopilot.signals import Severity, StatusText
-from fsw.link.files.flight_logs import MARK, FlightLogs, flight_logs
 from fsw.link.files.log_service import CHUNK, LogService
-from fsw.link.files.vehicle_files import vehicle_files
+from fsw.link.files.vehicle_files import MARK, FlightLogs, flight_logs, vehicle_files
 from fsw.link.wire.outgoing import ServiceOutput
 from messages import message_ids as ids
 from messages.block_file import BlockFile

@@ -11,10 +11,10 @@ from pathlib import Path
 import pytest
 
 from fsw.autopilot.signals import CommandRequest, CommandResult, StatusText
-from fsw.link.files.flight_logs import FlightLogs
 from fsw.link.files.log_stream import PIECE, LogStreamService
+from fsw.link.files.vehicle_files import FlightLogs
 from fsw.link.services.service import Outcome
-from fsw.link.wire.outgoing import PackedOutgoing, ServiceOutput
+from fsw.link.wire.outgoing import Outgoing, ServiceOutput
 from messages import message_ids as ids
 from messages.frames import Frame, FrameWriter, split
 
@@ -57,8 +57,8 @@ class Client:
 
     def take(self, answers: Sequence[ServiceOutput]) -> None:
         for piece in answers:
-            assert isinstance(piece, PackedOutgoing)
-            (frame,) = split(FrameWriter(1, 1).packed_frame(piece.message_id, piece.payload))
+            assert isinstance(piece, Outgoing)
+            (frame,) = split(FrameWriter(1, 1).packed_frame(piece.message_id, piece.values))
             number, system, component, length, begins, *data = frame.payload_values
             assert (system, component) == CLIENT
             if piece.message_id == ids.LOGGING_DATA_ACKED:
@@ -136,7 +136,7 @@ def test_what_is_not_acknowledged_is_sent_again_and_given_up(client: Client) -> 
         client.t_us += TICK_US
         answers += client.service.poll(client.t_us)
     *pieces, text = answers
-    assert len({piece.payload for piece in pieces if isinstance(piece, PackedOutgoing)}) == 1
+    assert len({piece.values for piece in pieces if isinstance(piece, Outgoing)}) == 1
     assert len(pieces) == 50
     assert isinstance(text, StatusText)
     assert text.text == "log stream ended: 255/190 acknowledges nothing"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from fsw.autopilot.signals import StatusText
-from fsw.link.wire.outgoing import Outgoing, PackedOutgoing, ServiceOutput, WireValues
+from fsw.link.wire.outgoing import Outgoing, ServiceOutput, WireValues
 from messages.frames import FrameWriter, split
 
 
@@ -15,8 +15,8 @@ def message_of(reported: ServiceOutput) -> int:
 
 def values_of(reported: ServiceOutput) -> WireValues:
     """Every field of a message, whether it was packed already or not."""
-    if isinstance(reported, Outgoing):
+    assert isinstance(reported, Outgoing)
+    if not isinstance(reported.values, bytes):
         return reported.values
-    assert isinstance(reported, PackedOutgoing)
-    (frame,) = split(FrameWriter(1, 1).packed_frame(reported.message_id, reported.payload))
+    (frame,) = split(FrameWriter(1, 1).packed_frame(reported.message_id, reported.values))
     return frame.payload_values

@@ -6,8 +6,7 @@ import math
 from dataclasses import replace
 
 from fsw.autopilot.signals import StatusText
-from fsw.link.telemetry.link_commands import LinkCommands
-from fsw.link.telemetry.stream_rates import StreamRates
+from fsw.link.telemetry.stream_rates import LinkCommands, StreamRates
 from fsw.link.telemetry.streams import GROUND_RATES, STREAMS
 from fsw.link.wire.outgoing import Outgoing
 from messages import message_ids as ids

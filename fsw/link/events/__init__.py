@@ -1,1 +1,0 @@
-"""MAVLink's events interface: what happens, in numbers that a document explains."""
