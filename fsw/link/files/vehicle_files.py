@@ -19,7 +19,7 @@ import fcntl
 import os
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from itertools import count
@@ -120,7 +120,9 @@ class FlightLogs:
         own = None if parameter_file is None else bytes(parameter_file.resolve())
         if own is not None:
             (directory / MARK).write_bytes(own)
-        self.all = flight_logs(directory, own)
+        self.by_name: dict[str, Node] = {}  # as directories of FTP: of each flight its files
+        self.by_day: dict[str, Node] = {}  # of each day its logs
+        self._offer(flight_logs(directory, own))
 
     @property
     def present_ulog(self) -> DiskFile | None:
@@ -135,8 +137,16 @@ class FlightLogs:
         """
         others = [log for log in self.all if log.flight != self._present]
         if others:
-            self.all = tuple(log for log in self.all if log.flight == self._present)
+            self._offer(tuple(log for log in self.all if log.flight == self._present))
         return Erasure(others)
+
+    def _offer(self, logs: tuple[LoggedFlight, ...]) -> None:
+        """Lay the directories out; only when logs come or go, for it takes a while."""
+        self.all = logs
+        self.by_name.clear()
+        self.by_name |= _by_name(logs)
+        self.by_day.clear()
+        self.by_day |= _by_day(logs)
 
 
 def flight_logs(directory: Path, own: bytes | None) -> tuple[LoggedFlight, ...]:
@@ -180,30 +190,6 @@ def _begun_s(directory: Path) -> int:
         return int(time.time())
 
 
-class _LaidOut(Mapping[str, Node]):
-    """A directory made of the flights whose logs there still are."""
-
-    def __init__(self, logs: FlightLogs, lay_out: Callable[[Sequence[LoggedFlight]], Directory]):
-        """Lay them out; again only when some have been erased, for it takes a while."""
-        self._logs = logs
-        self._lay_out = lay_out
-        self._laid_out, self._directory = logs.all, lay_out(logs.all)
-
-    def _up_to_date(self) -> Directory:
-        if self._logs.all is not self._laid_out:
-            self._laid_out, self._directory = self._logs.all, self._lay_out(self._logs.all)
-        return self._directory
-
-    def __getitem__(self, name: str) -> Node:
-        return self._up_to_date()[name]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._up_to_date())
-
-    def __len__(self) -> int:
-        return len(self._up_to_date())
-
-
 def _by_name(flights: Sequence[LoggedFlight]) -> Directory:
     return {
         one.flight: {file.path.name: file for file in one.files}
@@ -230,15 +216,14 @@ def vehicle_files(logs: FlightLogs) -> Directory:
 
     The logs are also where PX4 has them, in simulation (``log``) and on its card, by date.
     """
-    dated = _LaidOut(logs, _by_day)
-    px4 = {"log": dated, "fs": {"microsd": {"log": dated}}}
+    px4: dict[str, Node] = {"log": logs.by_day, "fs": {"microsd": {"log": logs.by_day}}}
     # Made now, so that no tick has to: it takes longer than six of them.
     metadata = {
         _GENERAL: MemoryFile(_general()[0]),
         _PARAMETERS: MemoryFile(_parameters()),
         _EVENTS: MemoryFile(event_document()),
     }
-    return {"logs": _LaidOut(logs, _by_name), **metadata, **px4}
+    return {"logs": logs.by_name, **metadata, **px4}
 
 
 def _can_be_listed(name: str) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import re
 import stat
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,8 +16,11 @@ from messages.addresses import LinkError
 
 _MODE: Final = 0o600
 _KEY_SIZE: Final = 32  # bytes
-_TIME_DIGITS: Final = 15  # of a signing time, which has 48 bits
 _MAX_BYTES: Final = 1024  # of a file that is read
+_HEAD: Final = b'{"key": "%s", "newest": '  # of the key in hexadecimal
+_TIME_AT: Final = len(_HEAD % bytes(2 * _KEY_SIZE))
+_TIME_SIZE: Final = 15  # digits of a signing time, which has 48 bits
+_FORM: Final = re.compile(rb'\{"key": "([0-9a-f]{64})", "newest": (?=.{15}\}) *\d+\}')
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +41,7 @@ class KeyFile:
 
     def __init__(self, path: Path) -> None:
         self._path = path
-        self._open: tuple[int, int] | None = None  # handle, and where the time begins
+        self._handle: int | None = None
 
     def read(self, latest: int) -> SigningKey | None:
         """The key, or None if there is none; its newest time must not be after ``latest`` [10 us].
@@ -83,19 +87,18 @@ class KeyFile:
                 return
         self._path.parent.mkdir(parents=True, exist_ok=True)
         beside = self._path.with_name(f"{self._path.name}.{os.getpid()}.new")
-        head = _head(key.key)
         # Created with its mode, never readable by others even for a moment.
         handle = os.open(beside, os.O_RDWR | os.O_CREAT | os.O_TRUNC, _MODE)
         try:
             os.fchmod(handle, _MODE)
-            os.write(handle, head + _digits(key.newest) + b"}")
+            os.write(handle, _HEAD % key.key.hex().encode() + _digits(key.newest) + b"}")
             os.fsync(handle)
             beside.replace(self._path)
         except BaseException:
             os.close(handle)
             raise
         self.close()
-        self._open = (handle, len(head))
+        self._handle = handle
 
     def keep(self, key: bytes, newest: int) -> None:
         """Keep the ``newest`` signing time [10 us] in the file, in place; a disk error is ignored.
@@ -104,15 +107,14 @@ class KeyFile:
         process has replaced is taken up if it holds the same ``key`` (32 bytes).
         """
         with contextlib.suppress(OSError):
-            if self._open is not None and os.fstat(self._open[0]).st_nlink == 0:
+            if self._handle is not None and os.fstat(self._handle).st_nlink == 0:
                 self.close()
                 self._take_up(key)
-            if self._open is not None:
-                handle, begin = self._open
-                kept = os.pread(handle, _TIME_DIGITS, begin)
+            if self._handle is not None:
+                kept = os.pread(self._handle, _TIME_SIZE, _TIME_AT)
                 # What is no number there, somebody else has put there.
                 if not kept.strip().isdigit() or newest > int(kept):
-                    os.pwrite(handle, _digits(newest), begin)
+                    os.pwrite(self._handle, _digits(newest), _TIME_AT)
 
     def remove(self) -> None:
         """Delete the key; raises OSError if that is not possible."""
@@ -121,28 +123,25 @@ class KeyFile:
 
     def close(self) -> None:
         """Change nothing in the file any more."""
-        if self._open is not None:
-            os.close(self._open[0])
-            self._open = None
+        if self._handle is not None:
+            os.close(self._handle)
+            self._handle = None
 
     def _take_up(self, key: bytes) -> bool:
         """Open the file for :meth:`keep`, if :meth:`write` has made it and with this key.
 
         Replaced, it would not be the file any more that another process keeps its time in.
         """
-        head = _head(key)
         with contextlib.ExitStack() as opened:
             handle = os.open(self._path, os.O_RDWR | os.O_NONBLOCK)
             opened.callback(os.close, handle)
-            content = os.read(handle, _MAX_BYTES)
+            found = _FORM.fullmatch(os.read(handle, _MAX_BYTES))
             others = os.fstat(handle).st_mode & 0o077
-            digits = content[len(head) : -1]
-            made = content[: len(head)] == head and content[-1:] == b"}"
-            if others or not made or len(digits) != _TIME_DIGITS or not digits.strip().isdigit():
+            if others or found is None or found[1] != key.hex().encode():
                 return False
             opened.pop_all()
         self.close()
-        self._open = (handle, len(head))
+        self._handle = handle
         return True
 
 
@@ -164,10 +163,5 @@ class NoKeyFile(KeyFile):
         """Nothing is there."""
 
 
-def _head(key: bytes) -> bytes:
-    """What stands before the time."""
-    return b'{"key": "%s", "newest": ' % key.hex().encode("ascii")
-
-
 def _digits(newest: int) -> bytes:
-    return b"%*d" % (_TIME_DIGITS, newest)
+    return b"%*d" % (_TIME_SIZE, newest)
