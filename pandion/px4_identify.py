@@ -18,7 +18,7 @@ from fsw.autopilot.parameters.flight_config import FlightConfig, above_px4, flig
 from fsw.autopilot.parameters.registry import PARAMETERS
 from fsw.autopilot.signals import ActuatorCommand, Arm, Mode, SensorFrame, TickOutputs
 from fsw.link.inbox import Inbox
-from fsw.link.px4.link import PX4_PORT, Px4Addresses, Px4Link, open_px4
+from fsw.link.px4.link import PX4_PORT, Px4Link, open_px4
 from fsw.runtime import clock
 from messages.addresses import LinkAddress
 from pandion.param_vehicle import NoAnswer, ParameterClient, ParameterRefused
@@ -104,7 +104,7 @@ def fly(
     config = above_px4(flight_config(vehicle=load_vehicle(vehicle)))
     gains = _gains(address)
     tell(", ".join(f"{name} {value:g}" for name, value in gains.items()))
-    inbox, where = Inbox(), Px4Addresses(address, None)
+    inbox, where = Inbox(), (address, None)
     identifier = Identifier(config.airframe, inbox, tell)
     with contextlib.closing(open_px4(where, inbox, vehicle_facts(config), clock.now_us)) as link:
         tell(

@@ -18,11 +18,7 @@ AUTOPILOTS: Final = {"px4": PX4, "generic": GENERIC}
 
 
 def parse_origin(text: str) -> Origin:
-    """Read LATITUDE,LONGITUDE,ALTITUDE in degrees and metres.
-
-    Raises:
-        ValueError: It is no place.
-    """
+    """Read LATITUDE,LONGITUDE,ALTITUDE in degrees and metres; ``ValueError`` if it is no place."""
     return Origin(*place(text))
 
 

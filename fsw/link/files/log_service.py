@@ -11,11 +11,12 @@ from __future__ import annotations
 import struct
 from collections import deque
 from collections.abc import Sequence
+from concurrent.futures import Future
 from typing import Final, NamedTuple, cast
 
-from fsw.autopilot.signals import Severity, StatusText
+from fsw.autopilot.signals import StatusText
 from fsw.link.files.served_file import OpenFile
-from fsw.link.files.vehicle_files import Erasure, FlightLogs
+from fsw.link.files.vehicle_files import FlightLogs
 from fsw.link.services.service import LinkService
 from fsw.link.wire.decode import Numbers
 from fsw.link.wire.outgoing import Outgoing, ServiceOutput
@@ -57,7 +58,7 @@ class LogService(LinkService):
     def __init__(self, logs: FlightLogs) -> None:
         self._kept = logs
         self._logs = logs.all
-        self._erasure: Erasure | None = None
+        self._erasure: Future[StatusText] | None = None
         self._listed: dict[int, int] = {}  # bytes that each log was listed with
         self._to_list: deque[int] = deque()
         self._requests: deque[_Request] = deque()
@@ -86,8 +87,8 @@ class LogService(LinkService):
         answers: list[ServiceOutput] = []
         while self._to_list and len(answers) < _ENTRIES:
             answers.append(self._entry(self._to_list.popleft()))
-        if self._erasure is not None and self._erasure.done:
-            answers.append(_erasure_text(self._erasure))
+        if self._erasure is not None and self._erasure.done():
+            answers.append(self._erasure.result())
             self._erasure = None
         if self._requests and not self._requests[0].paced:
             answers += self._data(_FRAMES - len(answers))
@@ -185,16 +186,6 @@ class LogService(LinkService):
         if self._open is not None:
             self._open[1].close()
             self._open = None
-
-
-def _erasure_text(erasure: Erasure) -> StatusText:
-    logs = "log" if erasure.erased == 1 else "logs"
-    text = f"{erasure.erased} {logs} erased, this flight's is kept"
-    if erasure.written:
-        text += f" and {erasure.written} of flights that are not over"
-    if not erasure.failed:
-        return StatusText(Severity.INFO, text)
-    return StatusText(Severity.WARNING, f"{text}; {erasure.failed} could not be: {erasure.reason}")
 
 
 def _log_data(log_id: int, offset: int, data: bytes) -> Outgoing:

@@ -47,11 +47,7 @@ class DiskFile:
     path: Path
 
     def status(self) -> os.stat_result:
-        """Size and time as the system knows them.
-
-        Raises:
-            OSError: It is gone.
-        """
+        """Size and time as the system knows them; ``OSError`` if it is gone."""
         return self.path.stat(follow_symlinks=False)
 
     @property

@@ -20,6 +20,7 @@ import os
 import threading
 import time
 from collections.abc import Sequence
+from concurrent.futures import Future
 from dataclasses import dataclass
 from functools import cache
 from itertools import count
@@ -28,7 +29,7 @@ from typing import Final
 
 from command_line.bounded_file import read_bounded
 from command_line.version import version
-from fsw.autopilot.signals import FlightSnapshot
+from fsw.autopilot.signals import FlightSnapshot, Severity, StatusText
 from fsw.link.events import event_document
 from fsw.link.files.served_file import Directory, DiskFile, MemoryFile, Node
 from fsw.link.wire.outgoing import Outgoing, TelemetryContext
@@ -58,36 +59,6 @@ class LoggedFlight:
     def log(self) -> DiskFile:
         """The file that stands for the flight."""
         return self.files[0]
-
-
-class Erasure:
-    """Logs on their way from the disk, in a thread: that takes longer than a tick."""
-
-    def __init__(self, logs: Sequence[LoggedFlight]) -> None:
-        self.erased = 0  # flights
-        self.written = 0  # flights that are not over: kept
-        self.failed = 0
-        self.reason = ""  # of the last that could not be
-        self._logs = logs
-        self._thread = threading.Thread(target=self._work, name="erase", daemon=True)
-        if logs:  # else there is nothing that takes time: a flood of requests starts no threads
-            self._thread.start()
-
-    @property
-    def done(self) -> bool:
-        """Whether it has come to its end."""
-        return not self._thread.is_alive()
-
-    def _work(self) -> None:
-        for log in self._logs:
-            try:
-                _erase(log)
-                self.erased += 1
-            except BlockingIOError:
-                self.written += 1
-            except OSError as error:
-                self.failed += 1
-                self.reason = f"{log.flight}: {error.strerror}"
 
 
 def _erase(log: LoggedFlight) -> None:
@@ -130,15 +101,23 @@ class FlightLogs:
         files = (file for log in self.all if log.flight == self._present for file in log.files)
         return next((file for file in files if file.path.suffix == ".ulg"), None)
 
-    def erase(self) -> Erasure:
+    def erase(self) -> Future[StatusText]:
         """Begin to delete the logs of finished flights; from now on only this one is listed.
 
-        Which of the others are finished is found out beside the ticks.
+        Which of the others are finished is found out beside the ticks, in a thread: to delete takes
+        longer than one. Returns what is to be said of it, once it is done.
         """
         others = [log for log in self.all if log.flight != self._present]
+        outcome = Future[StatusText]()
+        work = threading.Thread(
+            target=_erase_all, args=(others, outcome), name="erase", daemon=True
+        )
         if others:
             self._offer(tuple(log for log in self.all if log.flight == self._present))
-        return Erasure(others)
+            work.start()
+        else:  # nothing that takes time: a flood of requests starts no threads
+            work.run()
+        return outcome
 
     def _offer(self, logs: tuple[LoggedFlight, ...]) -> None:
         """Lay the directories out; only when logs come or go, for it takes a while."""
@@ -147,6 +126,24 @@ class FlightLogs:
         self.by_name |= _by_name(logs)
         self.by_day.clear()
         self.by_day |= _by_day(logs)
+
+
+def _erase_all(logs: Sequence[LoggedFlight], outcome: Future[StatusText]) -> None:
+    erased, written, failed, reason = 0, 0, 0, ""
+    for log in logs:
+        try:
+            _erase(log)
+            erased += 1
+        except BlockingIOError:
+            written += 1  # of a flight that is not over: kept
+        except OSError as error:
+            failed, reason = failed + 1, f"{log.flight}: {error.strerror}"
+    text = f"{erased} {'log' if erased == 1 else 'logs'} erased, this flight's is kept"
+    if written:
+        text += f" and {written} of flights that are not over"
+    if failed:
+        text += f"; {failed} could not be: {reason}"
+    outcome.set_result(StatusText(Severity.WARNING if failed else Severity.INFO, text))
 
 
 def flight_logs(directory: Path, own: bytes | None) -> tuple[LoggedFlight, ...]:

@@ -12,7 +12,7 @@ import math
 import select
 from collections.abc import Callable
 from functools import partial
-from typing import Final, NamedTuple, cast
+from typing import Final, cast
 
 from fsw.autopilot.ports import Clock, VehicleFacts
 from fsw.autopilot.signals import (
@@ -74,11 +74,8 @@ _SLOW: Final = 0.5  # of the rate asked for: less is asked for again
 _SPOKEN: Final = {ARM_DISARM: "arming", SET_MODE: "its mode", SET_INTERVAL: "a stream"}
 
 
-class Px4Addresses(NamedTuple):
-    """Where PX4 is, and where the arm speaks; None: on no link of its own."""
-
-    px4: LinkAddress
-    arm: LinkAddress | None
+Px4Addresses = tuple[LinkAddress, LinkAddress | None]
+"""Where PX4 is, and where the arm speaks; None: on no link of its own."""
 
 
 def px4_addresses(px4: str, arm: str | None) -> Px4Addresses:
@@ -87,14 +84,14 @@ def px4_addresses(px4: str, arm: str | None) -> Px4Addresses:
     Raises:
         LinkError: One of them is none, or PX4's is a line that is too slow for its estimate.
     """
-    found = Px4Addresses(parse_link_address(px4), None if arm is None else parse_link_address(arm))
-    speed = None if isinstance(found.px4, tuple) else found.px4.bytes_per_s
+    where = parse_link_address(px4)
+    speed = None if isinstance(where, tuple) else where.bytes_per_s
     if speed is not None and speed < MIN_BYTES_PER_S:
         raise LinkError(
             f"{px4} takes {speed} bytes/s and PX4's estimate needs {MIN_BYTES_PER_S}; "
             "use 460800 baud or more"
         )
-    return found
+    return where, None if arm is None else parse_link_address(arm)
 
 
 class Px4Link:
@@ -398,6 +395,7 @@ def open_px4(
     Raises:
         LinkError: One cannot be opened, or is too slow.
     """
-    endpoint, peer = open_endpoint(where.px4, clock, PX4_PORT)
-    arm = None if where.arm is None else partial(ArmLink, where.arm, inbox=inbox, clock=clock)
-    return Px4Link(endpoint, peer, inbox, facts, clock, arm, servos=servos)
+    px4, arm = where
+    endpoint, peer = open_endpoint(px4, clock, PX4_PORT)
+    opened = None if arm is None else partial(ArmLink, arm, inbox=inbox, clock=clock)
+    return Px4Link(endpoint, peer, inbox, facts, clock, opened, servos=servos)

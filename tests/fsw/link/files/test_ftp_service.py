@@ -550,7 +550,7 @@ def test_logs_are_where_px4_has_them_by_date(tmp_path: Path, root: str) -> None:
     session, _ = client.open(f"{folder}/{today}/{name}")
     assert client.burst(session, 0, 4)[0].data == b"now"
     erasure = logs.erase()
-    while not erasure.done:
+    while not erasure.done():
         time.sleep(0.001)
     assert client.names(root) == [f"D{today}"]
 

@@ -232,8 +232,9 @@ def test_only_logs_that_this_vehicle_has_marked_are_listed_served_and_erased(
     assert [log.flight for log in logs.all] == reached
     assert list(vehicle_files(logs)["logs"]) == reached  # type: ignore[call-overload]
     erasure = logs.erase()
-    wait_for(lambda: erasure.done)
-    assert (erasure.erased, erasure.failed) == (len(reached) - 1, 0)
+    counted = f"{len(reached) - 1} log{'' if len(reached) == 2 else 's'} erased"
+    said = StatusText(Severity.INFO, f"{counted}, this flight's is kept")
+    assert erasure.result(timeout=10.0) == said
     left = {path.parent.name for path in tmp_path.glob("*/flight.*")}
     assert left == {"mine", "other", "unmarked", "huge", "empty", "run"} - {*reached[:-1]}
 
@@ -253,8 +254,8 @@ def test_the_log_of_another_vehicle_that_flies_is_kept_and_told(tmp_path: Path) 
     telemetry.close()
     logs = FlightLogs(tmp_path / "here", OWN)
     erasure = logs.erase()
-    wait_for(lambda: erasure.done)
-    assert erasure.erased == 1, "a flight that is over has given its lock back"
+    said = erasure.result(timeout=10.0).text
+    assert said.startswith("1 log erased"), "a flight that is over has given its lock back"
 
 
 def test_a_log_that_cannot_be_erased_is_told(tmp_path: Path) -> None:
