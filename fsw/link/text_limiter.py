@@ -40,6 +40,15 @@ class _Budget:
     room: float = _BURST
     at_us: int = 0
 
+    def charge(self, t_us: int) -> bool:
+        """Whether there is room for one more text; it takes its place."""
+        grown = self.room + 1e-6 * _RATE_PER_S * (t_us - self.at_us)
+        self.room, self.at_us = min(grown, float(_BURST)), t_us
+        if self.room < 1.0:
+            return False
+        self.room -= 1.0
+        return True
+
 
 class TextLimiter:
     """One link's."""
@@ -91,20 +100,11 @@ class TextLimiter:
             return True
         if text.event is not None:
             event = text.event._replace(delay_us=0)
-            budget, room = _charged(self._failsafes.get(event), t_us)
-            self._failsafes[event] = budget
-            return room
+            return self._failsafes.setdefault(event, _Budget()).charge(t_us)
         key = _NUMBER.sub("#", text.text) if text.severity <= Severity.CRITICAL else ""
-        budget, room = _charged(self._budgets.get(key), t_us)
+        budget = self._budgets.get(key, _Budget())
         renew(self._budgets, key, budget, _MOST)
-        return room
-
-
-def _charged(before: _Budget | None, t_us: int) -> tuple[_Budget, bool]:
-    """The budget after one more text, and whether there was room for it."""
-    before = before or _Budget()
-    room = min(before.room + 1e-6 * _RATE_PER_S * (t_us - before.at_us), float(_BURST))
-    return _Budget(room - 1.0 if room >= 1.0 else room, t_us), room >= 1.0
+        return budget.charge(t_us)
 
 
 def _counted(sent: _Sent) -> StatusText:

@@ -66,11 +66,7 @@ class FlightLog:
     """
 
     def __init__(self, path: Path, subject: LogSubject) -> None:
-        """Create the file; nothing is in it before :meth:`begin`.
-
-        Raises:
-            OSError: The file exists or cannot be created.
-        """
+        """Create the file, empty until :meth:`begin`; ``OSError`` if it exists or cannot be."""
         self.file = BlockFile(path)
         self.lost_us = 0  # length of what the disk did not take in time
         self.unwritten_ticks = 0  # ticks with a number that fits no field
@@ -158,11 +154,7 @@ class TlogWriter:
     """
 
     def __init__(self, path: Path, start_unix_us: int) -> None:
-        """Create the file; sensor time 0 is stamped with ``start_unix_us``.
-
-        Raises:
-            OSError: The file exists or cannot be created.
-        """
+        """Create the file, or raise OSError; sensor time 0 is stamped with ``start_unix_us``."""
         self.file = BlockFile(path)
         self.file.start_thread()
         self._start_us = start_unix_us
@@ -197,11 +189,7 @@ class RunFiles:
         subject: LogSubject,
         warn: Callable[[str], None],
     ) -> None:
-        """Create both files in a directory that exists; sensor time 0 is ``start_unix_us``.
-
-        Raises:
-            OSError: A file exists or cannot be created.
-        """
+        """Create both files, or raise OSError; sensor time 0 is ``start_unix_us``."""
         self.ulog = FlightLog(directory / "flight.ulg", subject)
         self.tlog = TlogWriter(directory / "flight.tlog", start_unix_us)
         self._warn = warn

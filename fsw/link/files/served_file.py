@@ -59,11 +59,7 @@ class DiskFile:
             return 0
 
     def open(self) -> OpenFile:
-        """Open it for reading.
-
-        Raises:
-            OSError: It is gone, cannot be read or is no regular file.
-        """
+        """Open it; ``OSError`` if it is gone, cannot be read or is no regular file."""
         # O_NONBLOCK: to open a pipe would wait for its writer.
         descriptor = os.open(self.path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
         status = os.fstat(descriptor)

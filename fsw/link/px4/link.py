@@ -79,11 +79,7 @@ Px4Addresses = tuple[LinkAddress, LinkAddress | None]
 
 
 def px4_addresses(px4: str, arm: str | None) -> Px4Addresses:
-    """Read addresses.
-
-    Raises:
-        LinkError: One of them is none, or PX4's is a line that is too slow for its estimate.
-    """
+    """Read them; ``LinkError`` if one is none, or PX4's a line too slow for its estimate."""
     where = parse_link_address(px4)
     speed = None if isinstance(where, tuple) else where.bytes_per_s
     if speed is not None and speed < MIN_BYTES_PER_S:

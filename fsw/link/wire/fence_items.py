@@ -67,7 +67,8 @@ def read_fence(items: tuple[MissionItem, ...], locate: Locate, clearance: float)
     at = 0
     while at < len(items):
         item = items[at]
-        size = _vertex_count(item)
+        polygon = item.command in _POLYGONS and item.params[0] >= 1.0
+        size = int(item.params[0]) if polygon else 1
         if size > len(items) - at:
             raise BadItem(INVALID, f"a polygon of {size} vertices has {len(items) - at}")
         at += size
@@ -99,11 +100,6 @@ def check_fence_item(item: MissionItem, locate: Locate) -> None:
         raise BadItem(INVALID_PARAM1, f"a circle of radius {number:g} m")
     if item.command in _POLYGONS and not 3.0 <= number <= MAX_WALLS:
         raise BadItem(INVALID_PARAM1, f"a polygon of {number:g} vertices; 3 to {MAX_WALLS} do")
-
-
-def _vertex_count(item: MissionItem) -> int:
-    count = item.params[0]
-    return int(count) if item.command in _POLYGONS and count >= 1.0 else 1
 
 
 def _zones(items: tuple[MissionItem, ...], locate: Locate, clearance: float) -> list[Zone]:
