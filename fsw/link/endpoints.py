@@ -116,11 +116,7 @@ class StreamEndpoint:
     dropped: Final = None  # the kernel does not count what it drops of a stream
 
     def __init__(self, address: StreamAddress, clock: Clock) -> None:
-        """Begin to look for the peer; the clock is wall time.
-
-        Raises:
-            LinkError: It listens, and cannot.
-        """
+        """Begin to look for the peer, or to listen, else LinkError; the clock is wall time."""
         self.bytes_per_s = address.bytes_per_s
         self._name = address_text(address)
         self._clock = clock

@@ -65,11 +65,7 @@ class LinkChoice:
 
 
 def addresses(choice: LinkChoice) -> tuple[LinkAddress, LinkAddress | None]:
-    """Where ground stations and programs are: ``--gcs`` and ``--api`` of a choice.
-
-    Raises:
-        LinkError: One of them is none.
-    """
+    """Where ground stations and programs are; ``LinkError`` if that is no address, or the same."""
     api = None if choice.api == NO_LINK else parse_link_address(choice.api)
     gcs = parse_link_address(choice.gcs)
     # Two links cannot both speak on one serial line, whatever its speed.

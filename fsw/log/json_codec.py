@@ -71,11 +71,7 @@ class JsonCodec:
         return text
 
     def decode(self, name: str, text: bytes) -> Any:
-        """The field again.
-
-        Raises:
-            ValueError: The text is not what :meth:`encode` writes.
-        """
+        """The field again; ``ValueError`` if the text is not what :meth:`encode` writes."""
         try:
             found = json.loads(text, object_pairs_hook=unrepeated)  # noqa: TID251  # NaN is in it
             return self._codecs[name].read(found)

@@ -8,9 +8,10 @@ import struct
 from collections.abc import Callable, Iterator, Sequence
 from operator import attrgetter
 from struct import Struct
-from typing import Any, Final, Generic, TypeVar
+from typing import Any, Final
 
 from fsw.autopilot.measurements import Sample
+from fsw.autopilot.signals import FlightSnapshot
 from fsw.log import topics
 from messages.ulog import Topic, data_head
 from messages.ulog_reader import unpacker
@@ -18,7 +19,6 @@ from messages.ulog_reader import unpacker
 _LARGEST: Final = struct.unpack("<f", b"\xff\xff\x7f\x7f")[0]
 
 
-Subject = TypeVar("Subject")
 Values = tuple[Any, ...]
 _LATEST: Final = 1e12  # s; what is later fits no field
 
@@ -105,21 +105,21 @@ class Samples:
         return self._by_number[number].read(body)
 
 
-class Timetable(Generic[Subject]):
+class Timetable:
     """Records that have a rate each: one for the first tick in each of its intervals."""
 
-    def __init__(self, *rows: tuple[int, Callable[[Subject], bytes]]) -> None:
+    def __init__(self, *rows: tuple[int, Callable[[FlightSnapshot], bytes]]) -> None:
         """Take the interval [us] of each, and what makes it."""
         self._rows = rows
         self._looked_us = self._until_us = -1  # last, and until when nothing more is due
 
-    def due(self, t_us: int, subject: Subject) -> bytes:
-        """Those that are due at ``t_us``, of a ``subject``, in their order."""
+    def due(self, t_us: int, snapshot: FlightSnapshot) -> bytes:
+        """Those that are due at ``t_us``, of a ``snapshot``, in their order."""
         last_us = self._looked_us
         if last_us <= t_us < self._until_us:
             return b""
         found = [
-            record(subject)
+            record(snapshot)
             for period_us, record in self._rows
             if t_us // period_us != last_us // period_us
         ]

@@ -228,8 +228,7 @@ class ProcessLink:
     def send(self, value: object) -> None:
         """Send a value; it is dropped if the other side has not read for long.
 
-        Raises:
-            PeerGone: The other process has ended.
+        ``PeerGone`` if the other process has ended.
         """
         try:
             self._socket.send(pickle.dumps(value, pickle.HIGHEST_PROTOCOL), socket.MSG_DONTWAIT)
@@ -241,8 +240,7 @@ class ProcessLink:
     def receive(self, *, wait: bool) -> Any:
         """The next value; None if there is none and ``wait`` is False.
 
-        Raises:
-            PeerGone: The other process has ended, and nothing that it sent is left.
+        ``PeerGone`` if the other process has ended, and nothing that it sent is left.
         """
         try:
             message = self._socket.recv(_MAX_BYTES, 0 if wait else socket.MSG_DONTWAIT)

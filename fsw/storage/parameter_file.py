@@ -83,11 +83,7 @@ def parse(text: str) -> Loaded:
 
 
 def load(path: Path) -> Loaded:
-    """Read a file.
-
-    Raises:
-        OSError: It cannot be read, or is no file of parameters by its length.
-    """
+    """Read a file; ``OSError`` if it cannot be, or is too long for one of parameters."""
     data = read_bounded(path, _MAX_BYTES)
     encoding = next((name for mark, name in _MARKS.items() if data.startswith(mark)), "utf-8")
     # What is no text shows as lines of no use, not as an error.
@@ -167,11 +163,7 @@ class ParameterFile:
         self._executor: ThreadPoolExecutor | None = None
 
     def restore(self, store: ParameterStore) -> None:
-        """Let a store that has not flown yet take over what was kept.
-
-        Raises:
-            OSError: It cannot be written.
-        """
+        """Let a store that has not flown yet take over what was kept; writes both files."""
         self._store = store
         self.restored = store.restore(self._kept)
         self._save(store.values)

@@ -62,12 +62,7 @@ class LoggedFlight:
 
 
 def _erase(log: LoggedFlight) -> None:
-    """Delete the files of a flight, all or, where one of them is being written, none.
-
-    Raises:
-        BlockingIOError: One is being written.
-        OSError: One is gone, or cannot be deleted.
-    """
+    """Delete the files of a flight, all or, where one is being written (BlockingIOError), none."""
     with contextlib.ExitStack() as opened:
         for file in log.files:
             descriptor = os.open(file.path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
@@ -82,11 +77,7 @@ class FlightLogs:
     """The list that all links share."""
 
     def __init__(self, directory: Path, parameter_file: Path | None = None) -> None:
-        """Find this flight's log, which must exist already, and those of the vehicle's others.
-
-        Raises:
-            OSError: The directory cannot be written, or be read.
-        """
+        """Find this flight's log, which must exist already, and those of the vehicle's others."""
         self._present = directory.absolute().name
         own = None if parameter_file is None else bytes(parameter_file.resolve())
         if own is not None:

@@ -61,10 +61,9 @@ class ArmLink:
     """The link of an arm, and of who stands beside it."""
 
     def __init__(self, address: LinkAddress, joints: Joints, inbox: Inbox, clock: Clock) -> None:
-        """Begin to listen at ``address``, or to look for who is there; the clock is wall time.
+        """Begin to look for who is at ``address``, or to listen there, else LinkError.
 
-        Raises:
-            LinkError: It listens, and cannot.
+        The clock is wall time.
         """
         local_port = address[1] if isinstance(address, tuple) else 0
         self._endpoint, self._peer = open_endpoint(address, clock, local_port)

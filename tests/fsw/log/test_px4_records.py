@@ -206,7 +206,7 @@ def test_a_frame_of_which_the_samples_say_everything_takes_a_few_bytes(tmp_path:
 
 def test_what_has_a_rate_is_written_on_where_time_goes_back() -> None:
     """A first stamp that is ahead of all others is forgotten, and all that follow are earlier."""
-    table = Timetable[str]((10, str.encode), (25, lambda said: said.upper().encode()))
+    table = Timetable((10, str.encode), (25, lambda said: said.upper().encode()))
     stamps = (1000, 1005, 1010, 1024, 1025, 12, 15, 20, 26)
     assert [table.due(t_us, "a") for t_us in stamps] == [
         *(b"aA", b"", b"a", b"a", b"A"),
