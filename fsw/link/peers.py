@@ -35,9 +35,8 @@ class Peers:
         self.all: tuple[Address, ...] = (configured,)
         self.version_1: frozenset[Address] = frozenset()  # of these, those whose last frame was so
         self._configured = configured
-        self.last_received_us: dict[
-            Address, int
-        ] = {}  # of those that speak, in the order they came
+        # Of those that speak, in the order in which they came.
+        self.last_received_us: dict[Address, int] = {}
 
     def heard(self, peer: Address, now_us: int, *, version_1: bool = False) -> None:
         """Note a peer that has just sent a valid frame, of MAVLink 1 or 2."""

@@ -43,36 +43,26 @@ class _Doubt:
     steps: int = 1
 
 
+@dataclass(slots=True)
 class SensorClock:
     """Says which steps are new, and what time it is for the vehicle."""
 
-    def __init__(
-        self,
-        period_us: int,
-        clock: Clock,
-        say: Callable[[str], None],
-        jumped: Callable[[int], None],
-    ) -> None:
-        """Begin before the first step; steps are ``period_us`` apart.
-
-        ``say`` takes what was odd, and ``jumped`` by how much the sensors' clock did [us].
-        """
-        self.newest_us = -1  # stamp of the newest step, by the sensors' clock; -1: none yet
-        self.ahead_us = 0  # of the sensors' clock before the vehicle's time
-        self.looks = 0  # at what had come; steps of one look may be a burst of old ones
-        self.silences = 0  # in which a simulator that waits for an answer repeats its step
-        self._period_us = period_us
-        self._clock = clock
-        self._say = say
-        self._jumped = jumped
-        self._number = 0  # of a frame of the newest step
-        self._jumped_us = -_NUMBERED_US  # when the clock has jumped, monotonic
-        self._usual_us = 0  # how far a step may be ahead without a second thought
-        self._first = False  # the newest step is the first one
-        self._needed_back = _STEPS_BACK
-        self._doubt: _Doubt | None = None
-        self._heard_us = -1  # when a step was heard last, monotonic; -1: steps wait for answers
-        self._heard_stamp_us = -1  # its stamp
+    _period_us: int  # from step to step
+    _clock: Clock
+    _say: Callable[[str], None]  # takes what was odd
+    _jumped: Callable[[int], None]  # takes by how much the sensors' clock did [us]
+    newest_us: int = -1  # stamp of the newest step, by the sensors' clock; -1: none yet
+    ahead_us: int = 0  # of the sensors' clock before the vehicle's time
+    looks: int = 0  # at what had come; steps of one look may be a burst of old ones
+    silences: int = 0  # in which a simulator that waits for an answer repeats its step
+    _number: int = 0  # of a frame of the newest step
+    _jumped_us: int = -_NUMBERED_US  # when the clock has jumped, monotonic
+    _usual_us: int = 0  # how far a step may be ahead without a second thought
+    _first: bool = False  # the newest step is the first one
+    _needed_back: int = _STEPS_BACK
+    _doubt: _Doubt | None = None
+    _heard_us: int = -1  # when a step was heard last, monotonic; -1: steps wait for answers
+    _heard_stamp_us: int = -1  # its stamp
 
     def follows(self, t_us: int, number: int) -> bool:
         """Whether a stamp [us] is of a new step, which it is only once.

@@ -42,6 +42,7 @@ class FlightProgram:
     numbers: Mapping[str, float] = field(default_factory=dict)  # of the configuration, by name
 
 
+@dataclass(slots=True)
 class TickRunner:
     """Keeps the state between ticks, and repeats the last command if a tick fails.
 
@@ -50,21 +51,13 @@ class TickRunner:
     the actuators' time-out is over.
     """
 
-    def __init__(
-        self,
-        control: Control,
-        conclude: Conclude,
-        first_state: FlightState,
-        on_error: Callable[[], None] = traceback.print_exc,
-    ) -> None:
-        """Start before the first tick; a survived error calls ``on_error`` in its handler."""
-        self._control = control
-        self._conclude = conclude
-        self._on_error = on_error
-        self._state = first_state
-        self._begun: Controlled | TickOutputs | None = None  # the outputs are of a tick that failed
-        self._last: TickOutputs | None = None
-        self._failed = 0  # in a row
+    _control: Control
+    _conclude: Conclude
+    _state: FlightState  # before the first tick, and then after the last one
+    on_error: Callable[[], None] = traceback.print_exc  # in the handler of a survived error
+    _begun: Controlled | TickOutputs | None = None  # the outputs are of a tick that failed
+    _last: TickOutputs | None = None
+    _failed: int = 0  # in a row
 
     def __call__(self, inputs: TickInputs) -> TickOutputs:
         """Run one tick, both parts of it; raises what they raise."""
@@ -105,7 +98,7 @@ class TickRunner:
         self._failed += 1
         if self._last is None or self._failed > MAX_FAILED_TICKS:
             raise error
-        self._on_error()
+        self.on_error()
         text = f"tick failed, {type(error).__name__}: last command repeated"
         return replace(
             self._last,

@@ -115,14 +115,13 @@ class Release:
     begun_us: int  # monotonic
 
 
+@dataclasses.dataclass
 class StepReleases:
     """Lockstep: every step of the simulator releases a tick, whenever it comes."""
 
+    _vehicle: VehicleLink
+    _clock: Clock
     stale = skipped = 0  # every step is taken
-
-    def __init__(self, vehicle: VehicleLink, clock: Clock) -> None:
-        self._vehicle = vehicle
-        self._clock = clock
 
     def next(self) -> Release | None:
         """Wait for the next step; None if none came."""
@@ -133,36 +132,29 @@ class StepReleases:
         return Release(sensors, 0, now_us, now_us)
 
 
+@dataclasses.dataclass
 class ScheduledReleases:
-    """Real time: an absolute schedule, phased behind the arrival of the sensor frames."""
+    """Real time: an absolute schedule, phased behind the arrival of the sensor frames.
 
-    def __init__(
-        self,
-        vehicle: VehicleLink,
-        clock: Clock,
-        sleep: Callable[[float], None],
-        first: SensorFrame,
-        period_us: int,
-        deadlines: DeadlineMonitor,
-    ) -> None:
-        """Follow the first frame, on which a tick has run: the vehicle's time begins with it.
+    It follows the first frame, on which a tick has run: the vehicle's time begins with it.
+    """
 
-        ``sleep`` sleeps for seconds, on the same clock; ``deadlines`` takes the skipped releases.
-        """
-        self.stale = 0  # ticks without a frame of their own
-        self._vehicle = vehicle
-        self._clock = clock
-        self._sleep = sleep
-        self._period_us = period_us
-        self._deadlines = deadlines
-        self._schedule: ReleaseSchedule | None = None
-        self._offsets: list[int] = []  # arrival minus stamp, before the schedule begins
-        self._readings = first
-        self._t_us = first.t_us  # of the last tick
-        self._expected_us = first.t_us  # stamp of the frame that belongs to the last release
-        self._repeated = 0  # frames in a row whose tick had run before they came
-        self._ahead = 0  # frames in a row that were ahead of their release
-        self._without_tick = 0  # releases taken, but with too old readings for a tick
+    _vehicle: VehicleLink
+    _clock: Clock
+    _sleep: Callable[[float], None]  # for seconds, on the same clock
+    _readings: SensorFrame  # the newest, at first those of the first frame
+    _period_us: int
+    _deadlines: DeadlineMonitor  # takes the skipped releases
+    stale: int = 0  # ticks without a frame of their own
+    _schedule: ReleaseSchedule | None = None
+    _offsets: list[int] = dataclasses.field(default_factory=list)  # arrival minus stamp, before it
+    _repeated: int = 0  # frames in a row whose tick had run before they came
+    _ahead: int = 0  # frames in a row that were ahead of their release
+    _without_tick: int = 0  # releases taken, but with too old readings for a tick
+
+    def __post_init__(self) -> None:
+        self._t_us = self._readings.t_us  # of the last tick
+        self._expected_us = self._t_us  # stamp of the frame that belongs to the last release
 
     @property
     def skipped(self) -> int:

@@ -86,15 +86,8 @@ _VERSION: Final = _version_number()
 
 
 def autopilot_version(_: FlightSnapshot, __: TelemetryContext) -> WireValues:
-    """AUTOPILOT_VERSION: the PX4 that is followed, and our own version as middleware."""
-    nothing = (0,) * 8
-    return (
-        *(_CAPABILITIES, _UID, _FOLLOWED | _UNRELEASED, _VERSION, 0, 0, 0, 0),
-        *nothing,
-        *nothing,
-        *nothing,
-        *(0,) * 18,
-    )
+    """AUTOPILOT_VERSION: the PX4 that is followed, our version as middleware, and nothing else."""
+    return (_CAPABILITIES, _UID, _FOLLOWED | _UNRELEASED, _VERSION, *(0,) * 46)
 
 
 def current_mode(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues:
