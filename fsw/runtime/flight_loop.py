@@ -130,40 +130,30 @@ class LinkWatchdog:
         return self._silent_us
 
 
+@dataclass
 class FlightLoop:
     """Walks the table of rate groups on every release."""
 
-    def __init__(
-        self,
-        program: FlightProgram,
-        vehicle: VehicleLink,
-        ground: GroundLinks,
-        inbox: Inbox,
-        record: FlightRecord,
-        clock: Clock,
-        stop: StopRequest,
-        files: RunFiles,
-        sleep: Callable[[float], None] | None = None,
-        wall_clock: Clock = unix_us,
-        tell: Callable[[int, tuple[StatusText, ...]], None] = lambda t_us, texts: None,
-    ) -> None:
-        """``tell`` is given the time [us] and the texts of every tick, for the console."""
+    _program: FlightProgram
+    _vehicle: VehicleLink
+    _ground: GroundLinks
+    _inbox: Inbox
+    _record: FlightRecord
+    _clock: Clock
+    _stop: StopRequest
+    _files: RunFiles
+    sleep: Callable[[float], None] | None = None  # None: spare time reads the ground links
+    wall_clock: Clock = unix_us
+    # Given the time [us] and the texts of every tick, for the console.
+    tell: Callable[[int, tuple[StatusText, ...]], None] = lambda t_us, texts: None
+
+    def __post_init__(self) -> None:
+        program, record, clock = self._program, self._record, self._clock
         self._tick_us = program.facts.tick_period_us
-        self._parameters = program.parameters
-        self._missions = program.missions
-        self._happened = program.events
+        self._parameters, self._missions = program.parameters, program.missions
         self._tick = TickRunner(program.control, program.conclude, program.first_state)
-        self._vehicle = vehicle
-        self._ground = ground
-        self._inbox = inbox
-        self._record = record
-        self._clock = clock
-        self._stop = stop
-        self._files = files
-        self._sleep = sleep or ground.attend  # spare time reads the ground links
-        self._tell = tell
         self._notices: list[StatusText] = []
-        self._host = HostWatch(files, ground, clock, wall_clock)
+        self._host = HostWatch(self._files, self._ground, clock, self.wall_clock)
         self._host_news: HostHealth | None = None  # for the next tick
         self._vibration = VibrationMeter(program.parameters.values[ACCEL_RANGE])
         self._releases: StepReleases | ScheduledReleases
@@ -211,7 +201,7 @@ class FlightLoop:
             self._releases = ScheduledReleases(
                 self._vehicle,
                 self._clock,
-                self._sleep,
+                self.sleep or self._ground.attend,
                 first,
                 self._tick_us,
                 self._record.deadlines,
@@ -311,7 +301,7 @@ class FlightLoop:
             self._vehicle.queue_texts(outputs.texts[len(sent) :])
         self._missions.observe(outputs.snapshot)
         self._inbox.owner = outputs.snapshot.safe_set_owner
-        self._happened.observe(cycle.inputs, outputs)
+        self._program.events.observe(cycle.inputs, outputs)
         if cycle.inputs.tuning is not None:
             self._parameters.settle(outputs.tuning_taken)
         if cycle.inputs.mission is not None:
@@ -337,7 +327,7 @@ class FlightLoop:
         if self._notices:
             outputs = replace(outputs, texts=(*outputs.texts, *self._notices))
         self._ground.publish(outputs)
-        self._tell(cycle.release.sensors.t_us, outputs.texts)
+        self.tell(cycle.release.sensors.t_us, outputs.texts)
         # Lockstep has no other time for it; what is read now is in the next tick.
         self._ground.poll(cycle.release.sensors.t_us)
 

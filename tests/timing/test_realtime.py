@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 from fsw.link.wire import encode_dialect
-from fsw.runtime import realtime
+from fsw.runtime import process as realtime
 from fsw.runtime.process import settle_memory
 from fsw.runtime.rate_groups import RATE_GROUPS
 from messages.block_file import BlockFile
