@@ -6,7 +6,7 @@ Received data never raises, and only valid frames change the state of the link.
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import InitVar, asdict, dataclass
 from typing import Final
 
 from fsw.autopilot.ports import Clock, LinkLosses
@@ -66,35 +66,30 @@ class LinkSetup:
     remote: bool = False  # whether other machines are heard though the target is this one
 
 
+@dataclass(eq=False)
 class GcsLink:
     """Serves the configured peer and the peers that send valid frames."""
 
-    def __init__(
-        self,
-        setup: LinkSetup,
-        inbox: Inbox,
-        context: TelemetryContext,
-        signing: Signing,
-        clock: Clock,
-        record: RecordFrame | None,
-        services: Sequence[LinkService],
-        sent: SentFrames,
-    ) -> None:
-        """Open the link; ``record`` takes all frames of both directions; the clock is wall time.
+    _setup: LinkSetup
+    _inbox: Inbox
+    _context: TelemetryContext
+    signing: Signing
+    _clock: Clock  # wall time
+    record: InitVar[RecordFrame | None]  # takes all frames of both directions
+    services: InitVar[Sequence[LinkService]]
+    _sent: SentFrames  # of all links: known again on each
+    accepted: int = 0  # frames
+    echoes: int = 0  # frames of ours that came back: dropped
+    elsewhere: int = 0  # accepted frames for another system or component
 
-        What all links have ``sent`` is known again on each.
-        """
+    def __post_init__(self, record: RecordFrame | None, services: Sequence[LinkService]) -> None:
+        setup, context, clock = self._setup, self._context, self._clock
         self.name = setup.name
         self.losses = Losses()
-        self.signing = signing
-        self.outbox = Outbox(signing)
+        self.outbox = Outbox(self.signing)
         self.dispatch = Dispatch(services, self.outbox.add_output)
-        self.accepted = 0  # frames
-        self.echoes = 0  # frames of ours that came back: dropped
-        self.elsewhere = 0  # accepted frames for another system or component
         self.unhandled: dict[int, int] = {}  # accepted frames of no use here, by message
-        self._sent = sent
-        handled = (inbox.message_ids, self.dispatch.message_ids, {message_ids.SETUP_SIGNING})
+        handled = (self._inbox.message_ids, self.dispatch.message_ids, {message_ids.SETUP_SIGNING})
         self._handled = frozenset[int]().union(*handled)
         self._endpoint, peer = open_endpoint(
             setup.target, clock, setup.local_port, remote=setup.remote
@@ -111,11 +106,7 @@ class GcsLink:
         self._looks = 0  # for news
         self._told_slow = False
         self.talks = setup.unheard  # whether more than a heartbeat is sent
-        self._unheard = setup.unheard
         self.peers = Peers(peer)
-        self._inbox = inbox
-        self._context = context
-        self._clock = clock
         self._received, self._told = BoundedRecord(record), BoundedRecord(record)
         self._commands = LinkCommands(self.rates, context, services)
         self._snapshot: FlightSnapshot | None = None
@@ -223,7 +214,7 @@ class GcsLink:
             self.outbox.add_overdue_texts(snapshot.t_us)
             self.peers.expire(self._clock())
             self.rates.heard_by(frozenset(self.peers.last_received_us))
-            self.talks = self._unheard or bool(self.peers.last_received_us)
+            self.talks = self._setup.unheard or bool(self.peers.last_received_us)
             if self._line is not None:
                 self.rates.fit()
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import hmac
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 from hashlib import sha256
 from typing import Final, cast
@@ -125,35 +125,27 @@ class SigningCounters:
     wrong_time: int = 0  # replayed, or too far ahead
 
 
+@dataclass
 class Signing:
-    """The key of one link; without a key everything passes."""
+    """The key of one link; without a key everything passes.
 
-    def __init__(
-        self,
-        link_id: int,
-        unix_us: Callable[[], int],
-        file: KeyFile,
-        times: SignedTimes,
-    ) -> None:
-        """Take up the key that an earlier flight left.
+    The key that an earlier flight left is taken up: ``LinkError`` if its file is there and cannot
+    be trusted or read.
+    """
 
-        ``link_id``, 0..255, distinguishes our links in our own signatures. All links of a vehicle
-        share their ``times``, so that no frame of one can be played to another.
+    _link_id: int  # 0..255, distinguishes our links in our own signatures
+    _unix_us: Callable[[], int]
+    _file: KeyFile
+    _times: SignedTimes  # of all links, so that no frame of one can be played to another
+    counters: SigningCounters = field(default_factory=SigningCounters)
 
-        Raises:
-            LinkError: The file is there and cannot be trusted or read.
-        """
-        self.counters = SigningCounters()
-        self._link_id = link_id
-        self._unix_us = unix_us
-        self._file = file
-        self._times = times
-        stored = file.read(self._now() + TOLERANCE)
+    def __post_init__(self) -> None:
+        stored = self._file.read(self._now() + TOLERANCE)
         self._key = b"" if stored is None else stored.key
         self._sent = 0
         if stored is not None:
             # Frames of a flight before this one must not be played to this one.
-            self._times.of(stored.key).join(file, stored.newest)
+            self._times.of(stored.key).join(self._file, stored.newest)
             self._sent = stored.newest
 
     @property
