@@ -24,11 +24,9 @@ from fsw.autopilot.model.airframe import GRAVITY, Airframe
 from fsw.autopilot.signals import (
     FlightSnapshot,
     Origin,
-    PlanInput,
     PredictionState,
     RotorVector,
     Vec3,
-    Vec4,
 )
 from fsw.log.packed import Packed
 
@@ -81,7 +79,24 @@ class Px4Records:
 
     def _flags(self, snapshot: FlightSnapshot) -> bytes:
         self._failures = snapshot.failures
-        return _failsafe_flags(snapshot)
+        active = frozenset(snapshot.failures)
+        level, height, level_speed, climb = validity(snapshot)
+        charge = int(snapshot.battery.charge)
+        return _FLAGS.pack(
+            snapshot.t_us,
+            (
+                *(not _ATTITUDE_LOST.isdisjoint(active), not height),
+                *(not level, not (level_speed and climb)),
+                snapshot.mission.total == 0,
+                Condition.SETPOINTS_LOST.value in active,
+                Condition.DATALINK_LOST.value in active,
+                charge,
+                Condition.FLIGHT_TIME_LOW.value in active,
+                Condition.FENCE_BREACH.value in active,
+                Condition.TILT_LOST.value in active,
+                not _ROTOR.isdisjoint(active),
+            ),
+        )
 
     def _torques(self, snapshot: FlightSnapshot) -> bytes:
         thrust = snapshot.actuators.rotor_thrust
@@ -95,7 +110,10 @@ class Px4Records:
         plan = snapshot.plan_state
         if plan is None:
             return found
-        attitude = (*_attitude(plan, snapshot.plan_input), plan.yaw_rate, *thrust)
+        # Of the attitude for the acceleration in force.
+        a = plan.a if snapshot.plan_input is None else snapshot.plan_input.a
+        q = quaternion_from_euler(attitude_reference(a, plan.yaw))
+        attitude = (*q, plan.yaw_rate, *thrust)
         return found + _ATTITUDE.pack(t_us, attitude, (*planned_rates(plan), *thrust))
 
     def _slow(self, snapshot: FlightSnapshot) -> bytes:
@@ -165,11 +183,6 @@ def _sum(shares: list[float], thrust: RotorVector) -> float:
     return sum([share * f for share, f in zip(shares, thrust, strict=True)])
 
 
-def _attitude(plan: PredictionState, u: PlanInput | None) -> Vec4:
-    """Quaternion [w, x, y, z] of the attitude for the acceleration in force."""
-    return quaternion_from_euler(attitude_reference(plan.a if u is None else u.a, plan.yaw))
-
-
 def _place(snapshot: FlightSnapshot, origin: Origin) -> bytes:
     known = snapshot.estimator
     here = _on_earth(origin, snapshot.estimate.p_WB)
@@ -195,24 +208,3 @@ def _on_earth(origin: Origin, p: Vec3) -> Vec3:
     if not all(map(math.isfinite, p)):
         return _NAN, _NAN, _NAN
     return to_global(origin, p)
-
-
-def _failsafe_flags(snapshot: FlightSnapshot) -> bytes:
-    active = frozenset(snapshot.failures)
-    level, height, level_speed, climb = validity(snapshot)
-    charge = int(snapshot.battery.charge)
-    return _FLAGS.pack(
-        snapshot.t_us,
-        (
-            *(not _ATTITUDE_LOST.isdisjoint(active), not height),
-            *(not level, not (level_speed and climb)),
-            snapshot.mission.total == 0,
-            Condition.SETPOINTS_LOST.value in active,
-            Condition.DATALINK_LOST.value in active,
-            charge,
-            Condition.FLIGHT_TIME_LOW.value in active,
-            Condition.FENCE_BREACH.value in active,
-            Condition.TILT_LOST.value in active,
-            not _ROTOR.isdisjoint(active),
-        ),
-    )
