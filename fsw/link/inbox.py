@@ -33,6 +33,7 @@ from fsw.autopilot.signals import (
 from fsw.autopilot.tuning import Tuning
 from fsw.link.wire import decode, decode_commands
 from fsw.link.wire.decode import Numbers
+from fsw.link.wire.decode_sensors import battery_reading
 from fsw.link.wire.decode_setpoints import (
     actuator_setpoint,
     attitude_setpoint,
@@ -150,10 +151,11 @@ class Inbox:
             self.refused += len(kept) - MAX_SAMPLES
             del kept[:-MAX_SAMPLES]
 
-    def accept_battery(self, reading: BatteryReading) -> None:
-        """Keep what the battery's sensor has measured last."""
-        self._is_news = True
-        self._received.battery = reading
+    def accept_battery(self, values: Numbers) -> None:
+        """Keep what a BATTERY_STATUS says, if it knows the battery's voltage and charge."""
+        reading = battery_reading(values)
+        if reading is not None:
+            self._is_news, self._received.battery = True, reading
 
     def accept_clock_jump(self, jump_us: int) -> None:
         """Keep by how much [us] the sensors' clock has jumped against the vehicle's time."""

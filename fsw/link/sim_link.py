@@ -37,7 +37,7 @@ from fsw.link.sensor_clock import SensorClock
 from fsw.link.vehicle_link import Pacing
 from fsw.link.wire import decode
 from fsw.link.wire.decode import Numbers
-from fsw.link.wire.decode_sensors import SampleDecoder, battery_reading
+from fsw.link.wire.decode_sensors import SampleDecoder
 from fsw.link.wire.encode_standard import command_ack, hil_actuator_controls, vehicle_heartbeat
 from fsw.link.wire.outgoing import PX4
 from messages import dialect, message_ids, status_text
@@ -184,9 +184,7 @@ class SimLink:
             return sensors
         for frame in frames:
             if frame.message_id == message_ids.BATTERY_STATUS:
-                reading = battery_reading(cast(Numbers, frame.payload_values))
-                if reading is not None:
-                    self._inbox.accept_battery(reading)
+                self._inbox.accept_battery(cast(Numbers, frame.payload_values))
             elif frame.message_id in self._for_inbox:
                 self._inbox.accept(frame, _source(frame))
         return sensors

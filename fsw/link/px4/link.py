@@ -50,7 +50,6 @@ from fsw.link.px4.messages import (
 )
 from fsw.link.vehicle_link import Pacing
 from fsw.link.wire.decode import Numbers
-from fsw.link.wire.decode_sensors import battery_reading
 from messages import message_ids, status_text
 from messages.addresses import Address, LinkAddress, LinkError, parse_link_address
 from messages.frames import Frame, Losses
@@ -143,7 +142,7 @@ class Px4Link:
             message_ids.HEARTBEAT: self._take_heartbeat,
             message_ids.CURRENT_MODE: self._take_mode,
             message_ids.EXTENDED_SYS_STATE: self._take_landed,
-            message_ids.BATTERY_STATUS: self._take_battery,
+            message_ids.BATTERY_STATUS: inbox.accept_battery,
             message_ids.TIMESYNC: self._take_time,
             message_ids.COMMAND_ACK: self._hear_answer,
         }
@@ -227,11 +226,6 @@ class Px4Link:
 
     def _take_landed(self, values: Numbers) -> None:
         self._landed = int(values[1]) <= ON_GROUND
-
-    def _take_battery(self, values: Numbers) -> None:
-        reading = battery_reading(values)
-        if reading is not None:
-            self._inbox.accept_battery(reading)
 
     def _take_time(self, values: Numbers) -> None:
         answered_ns, sent_ns = int(values[0]), int(values[1])

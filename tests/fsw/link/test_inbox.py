@@ -7,13 +7,14 @@ from collections.abc import Callable
 
 import pytest
 
-from fsw.autopilot.signals import BatteryReading, MessageSource, SensorFrame, TickInputs
+from fsw.autopilot.signals import MessageSource, SensorFrame, TickInputs
 from fsw.link.inbox import Inbox
 from messages import message_ids as ids
 from messages.frames import FrameWriter, split
 
 NONE = (0.0, 0.0, 0.0)
 SENSORS = SensorFrame(1_002_000, NONE, NONE, (1.0, *NONE), NONE, NONE, NONE[:2], NONE[:2])
+BATTERY = (0, 0, 0, 15_000, *(0,) * 13, 50)  # of a BATTERY_STATUS: mV, %
 
 
 def frame(message_id: int, *values: float | bytes) -> Callable[[Inbox], None]:
@@ -22,7 +23,7 @@ def frame(message_id: int, *values: float | bytes) -> Callable[[Inbox], None]:
 
 
 NEWS: dict[str, tuple[str, Callable[[Inbox], None]]] = {
-    "battery": ("battery", lambda inbox: inbox.accept_battery(BatteryReading(15.0, 0.5))),
+    "battery": ("battery", lambda inbox: inbox.accept_battery(BATTERY)),
     "jump": ("sensor_clock_jump_us", lambda inbox: inbox.accept_clock_jump(-4_000)),
     "command": ("commands", frame(ids.COMMAND_LONG, 1.0, *NONE, *NONE, 400, 1, 1, 0)),
     "station": ("ground_station_heard", frame(ids.HEARTBEAT, 0, 6, 8, 0, 4, 3)),
