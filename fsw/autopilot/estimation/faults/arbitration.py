@@ -64,6 +64,7 @@ _IS_WHAT_IT_WAS: Final = 16.3  # chi-square, exceeded by chance once in a thousa
 _HALVES: Final = ((Source.ACCELEROMETER, NO_FORCE), (Source.GYRO, NO_RATE))
 _USED: Final = 0.5  # s; what was refused for longer finds no bias
 _LASTED: Final = 0.05  # s, of integrals
+_ALONE: Final = 2.5  # periods since a pose was used: one has been refused
 _BOTH: Final = Source.ACCELEROMETER | Source.MODEL
 _UNIT: Final = Source.GYRO | Source.ACCELEROMETER
 _POSE: Final = Source.POSE | Source.ATTITUDE
@@ -366,9 +367,12 @@ def _stuck(memory: FusionMemory) -> Source:
 def _stepped(memory: FusionMemory) -> Source:
     """A pose whose place has changed at once, and is refused: what is off may be so in both parts.
 
-    Where the rotors' model says nothing either, its attitude would make a sound gyro a suspect.
+    Where the rotors' model says nothing either, its attitude would make a sound gyro a suspect. Of
+    one pose that is refused alone, as every camera sends now and then, no window holds enough.
     """
-    return _POSE if any(one.stepped for one in memory.runs) else NOBODY
+    health = memory.of(Sensor.POSE)
+    alone = memory.now - max(health.fused, default=memory.now) < _ALONE * health.apart
+    return _POSE if not alone and any(one.stepped for one in memory.runs) else NOBODY
 
 
 def _widened(x: Any, verdict: Verdict, aided: Source) -> Verdict:

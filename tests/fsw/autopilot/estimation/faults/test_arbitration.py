@@ -47,6 +47,7 @@ def hovering(
     apart: int = 5,
     gust: float = 0.0,
     unit: bool = True,
+    outliers: int = 1 << 30,
 ) -> Iterator[FusionMemory]:
     """The memories of 5 s.
 
@@ -56,7 +57,8 @@ def hovering(
     known to be ``damaged``, and its tool ``touches`` something. Poses may be ``turned_by`` an angle
     [rad, FRD] at each time [s] of that second, and ``moved_by`` so much [m]; the accelerometer is
     ``pushed_by`` so much [m/s^2]. Poses are so many ticks ``apart``. A ``gust`` [m/s^2] carries the
-    vehicle away; it may have had no inertial ``unit`` since poses have been good for 3 s.
+    vehicle away; it may have had no inertial ``unit`` since poses have been good for 3 s. One pose
+    in so many ticks is one of the ``outliers``, 0.3 m off.
     """
     memory, random = at_start(2), np.random.default_rng(3)
     for tick in range(round(5.0 / TICK)):
@@ -80,6 +82,8 @@ def hovering(
             if wrong and turned_by is not None:
                 attitude = turned(attitude, *turned_by(t - WRONG_FROM))
                 place = place[0] + moved_by, *place[1:]
+            if tick % outliers == outliers - apart:
+                place = place[0], place[1] + 0.3, place[2]
             samples.insert(0, PoseSample(now, place, attitude, FINE, FINE))
         memory, found = FUSION.take_in(memory, samples, now, HOVERS)
         memory, _ = FUSION.catch_up(memory, samples, found, damaged=damaged, touches=touches)
@@ -338,3 +342,12 @@ def test_a_pose_whose_place_has_jumped_accuses_nobody_by_its_attitude() -> None:
     assert not memory.verdict.is_on
     assert not memory.verdict.wrong
     assert not memory.reset.number
+
+
+@pytest.mark.requirement("REQ-EST-13")
+def test_an_attitude_that_turns_is_told_among_outliers() -> None:
+    """One refused pose made all windows wait: an outlier in 2 s hid 2 deg/s for 8 s."""
+    turns = hovering(turned_by=lambda t: (0.0, 0.0, 0.08 * t), apart=10, outliers=100)
+    turning = last(turns)
+    assert turning.verdict.suspects & Source.ATTITUDE
+    assert not any(memory.verdict.is_on for memory in hovering(apart=10, outliers=100))
