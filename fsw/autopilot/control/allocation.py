@@ -15,7 +15,7 @@ from __future__ import annotations
 from typing import Final
 
 from fsw.autopilot.geometry.vectors import clamp, clamp_magnitude
-from fsw.autopilot.model.airframe import Airframe
+from fsw.autopilot.model.airframe import GRAVITY, Airframe
 from fsw.autopilot.model.multibody import factorise, solve
 from fsw.autopilot.signals import Vec2, Vec3
 from fsw.autopilot.tick_record import Mixer, Tick
@@ -65,6 +65,27 @@ def allocate(
             elif f > m.top[i]:
                 f = m.top[i]
         r.wanted.rotor_thrust[i] = f
+
+
+@compilable
+def authority_left(r: Tick, airframe: Airframe) -> float:
+    """The share [1] of roll or pitch torque that is left about hover, of the axis with less.
+
+    Of a rotor its range to the nearer limit counts, against that of a sound one. Reads health.
+    """
+    n, w, health, least = int(airframe.rotors), airframe.wrench, r.health, 1.0
+    hover = airframe.mass * GRAVITY / n
+    for axis in (3, 4):
+        whole = left = 0.0
+        for i in range(n):
+            top = airframe.rotor_thrust_max[i]
+            sound = abs(w[6 * i + axis]) * min(hover, top - hover)
+            high = min(top * health.effectiveness[i], health.most[i])
+            room = min(high - hover, hover - health.least[i]) / min(hover, top - hover)
+            whole += sound
+            left += sound * clamp(room, 0.0, 1.0)
+        least = min(least, left / whole)
+    return least
 
 
 @compilable

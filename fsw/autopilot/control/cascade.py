@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from fsw.autopilot.barriers.safe_approach import BarrierTuning
 from fsw.autopilot.control.actuator_watch import felt_inside
-from fsw.autopilot.control.allocation import allocate
+from fsw.autopilot.control.allocation import allocate, authority_left
 from fsw.autopilot.control.arm_compensation import compensate, lately_off_plan
 from fsw.autopilot.control.gains import LoopGains, tracking_gains
 from fsw.autopilot.control.joint_reference import refer
@@ -213,7 +213,8 @@ def close_loops(r: Tick, law: CascadeLaw, ticks: int, zones: Zones, probes: Filt
         turn, thrust = turn_to_plan(r, law, motion)
     else:
         turn, thrust = turn_by_pid(r, law)
-    turn = limited_turn(airframe, estimate, motion.turning, turn)
+    left = authority_left(r, airframe)
+    turn = limited_turn(airframe, estimate, motion.turning, turn, left)
     refer_joints(r, law, dt * ticks)
     drive_joints(r, law, motion, ticks)
     pushed, turned = load_of_tip(r, airframe.bodies, r.wanted.joint_torque)

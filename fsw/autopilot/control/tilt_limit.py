@@ -27,10 +27,14 @@ _POLE = 12.0  # 1/s; quicker than the plan's own attitude (7), which it must not
 
 
 @compilable
-def limited_turn(airframe: Airframe, estimate: AnyEstimate, turning: Vec3, wd: Vec3) -> Vec3:
+def limited_turn(
+    airframe: Airframe, estimate: AnyEstimate, turning: Vec3, wd: Vec3, left: float
+) -> Vec3:
     """Angular acceleration ``wd`` [rad/s^2, FRD], as far as tilt and body rates allow.
 
-    ``turning`` [rad/s^2, FRD] is the angular acceleration that there is.
+    ``turning`` [rad/s^2, FRD] is the angular acceleration that there is. Of a vehicle that has a
+    share ``left`` [1] of its torques the tilt stays within that share of its limit: a plan does not
+    know how slowly it turns, and would make it swing.
     """
     lag, R = airframe.rotor_lag, estimate.R_WB
     wx, wy, wz = estimate.w_WB_B[0], estimate.w_WB_B[1], estimate.w_WB_B[2]
@@ -46,7 +50,7 @@ def limited_turn(airframe: Airframe, estimate: AnyEstimate, turning: Vec3, wd: V
         y,
         _POLE * (2.0 * zx + _POLE * ahead_x),
         _POLE * (2.0 * zy + _POLE * ahead_y),
-        _POLE * _POLE * airframe.tilt_max,
+        _POLE * _POLE * airframe.tilt_max * left,
     )
     return x, y, clamp(wd[2], _POLE * (-most_yaw - wz), _POLE * (most_yaw - wz))
 

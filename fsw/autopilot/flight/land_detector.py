@@ -7,8 +7,9 @@ carry less than the weight, the loops open and rotors idle. In the air the vehic
 its velocity shows it within 0.1 s: even an accelerometer that is wrong by 3 m/s^2 shows 6.8 of
 free fall's 9.8, and on the ground no more than 3. Then the loops close again.
 
-Where the rotors' model stands in for gyro or accelerometer, or sensors contradict each other, the
-ground must not carry any of the weight: what the legs feel would be taken for a tilt or a climb.
+Where the rotors' model stands in for gyro or accelerometer, sensors contradict each other, or a
+rotor does not obey, the ground must not carry any of the weight: what the legs feel would be taken
+for a tilt, a climb or that rotor's thrust.
 Then rotors stop as soon as the legs are close above the ground, and the vehicle falls less far than
 its legs stand.
 
@@ -170,6 +171,7 @@ def feel_ground(
     """
     vehicle, now_us, sinking = state.vehicle, estimate.t_us, estimate.v_WB[2]
     in_doubt = state.aiding.has_lost(Sensor.IMU) or state.aiding.disputed_us > 0
+    in_doubt = in_doubt or state.damage.report.disobeys
     if in_doubt and is_close(config, state, estimate):
         return state, True
     sunk = 0.0 if state.aiding.gyro_lost else _SUNK

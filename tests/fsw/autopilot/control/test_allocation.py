@@ -14,13 +14,15 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.optimize import linprog
 
-from fsw.autopilot.model.actuator_health import ActuatorHealth
+from fsw.autopilot.control.allocation import authority_left
+from fsw.autopilot.model.actuator_health import ActuatorHealth, note_health
 from fsw.autopilot.model.airframe import AIRFRAME, Airframe, airframe_of
 from fsw.autopilot.model.prediction import Array
+from fsw.autopilot.tick_record import new_tick
 from tests.fsw.records import allocated
 from tests.vehicles.random_vehicles import random_vehicle
 from vehicles.description import Rotor
-from vehicles.vehicle_file import load_vehicle
+from vehicles.vehicle_file import load_vehicle, vehicle_names
 
 HOVER = 3.5 * 9.81
 TOP = 2.0 * 3.5 * 9.81 / 4.0
@@ -161,6 +163,27 @@ def test_a_rotor_that_does_not_obey_is_left_where_it_is_and_yaw_is_given_up(roto
     got = wrench(rotors)
     np.testing.assert_allclose([got[0], got[1], got[3]], [0.4, -0.5, HOVER], atol=1e-9)
     assert abs(got[2]) > 0.01
+
+
+@pytest.mark.parametrize("rotor", range(4))
+def test_what_is_left_of_a_torque_is_what_rotors_can_give_about_hover(rotor: int) -> None:
+    def left(effect: float = 1.0, least: float = 0.0, most: float = math.inf) -> float:
+        before, r = (1.0,) * rotor, new_tick(3.5, 4, 2)
+        noughts, free = (0.0,) * rotor, (math.inf,) * rotor
+        known = ActuatorHealth((*before, effect), (*noughts, least), (*free, most))
+        note_health(r.health, known)
+        return authority_left(r, AIRFRAME)
+
+    assert left() == 1.0
+    assert left(least=6.0, most=6.0) == pytest.approx(0.5)  # two rotors turn it about each axis
+    assert left(most=0.0) == pytest.approx(0.5)
+    shares = [left(effect=share) for share in (0.5, 0.6, 0.75, 0.9)]
+    assert shares == pytest.approx([0.5, 0.6, 0.75, 0.9])
+
+
+@pytest.mark.parametrize("name", vehicle_names())
+def test_a_sound_vehicle_has_all_its_torque_whatever_its_rotors(name: str) -> None:
+    assert authority_left(new_tick(3.5, 4, 2), airframe_of(load_vehicle(name))) == 1.0
 
 
 def ring(random: np.random.Generator, rotors: int, tilt: float) -> tuple[Rotor, ...]:

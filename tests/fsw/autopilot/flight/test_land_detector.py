@@ -21,9 +21,9 @@ from fsw.autopilot.flight.land_detector import (
     stands,
     with_range,
 )
-from fsw.autopilot.flight.state import AIDED, Aiding, LostSensor, first_state
+from fsw.autopilot.flight.state import AIDED, Aiding, Damage, LostSensor, first_state
 from fsw.autopilot.measurements import RangeSample, Sensor
-from fsw.autopilot.signals import Mode, Vec3
+from fsw.autopilot.signals import ActuatorReport, Mode, Vec3
 from tests.fsw.autopilot.flight.in_flight import GROUND_Z, flying, limits, vehicle_at
 from tests.fsw.records import changed, with_record
 
@@ -128,7 +128,8 @@ def test_on_readings_in_doubt_rotors_stop_close_above_the_ground(
 ) -> None:
     """The force of the ground was taken for a climb: for 5 s the vehicle hopped, or it fell over.
 
-    Sound readings carry it down to the ground.
+    Sound readings carry it down to the ground, but where a rotor does not obey: what the legs felt
+    was taken for its thrust, and the others ran on until the battery was empty.
     """
     state = flying(Mode.DESCEND, ranges=kept(sample))
     carries = changed(state.record, rotors=(0.25 * WEIGHT,) * 4)
@@ -139,6 +140,10 @@ def test_on_readings_in_doubt_rotors_stop_close_above_the_ground(
         # What is estimated by sensors that contradict each other may be wrong as well.
         known = aiding.lost or (aiding.disputed_us and sample)
         assert found[1] is (landed and bool(known))
+    disobeys = Damage(report=ActuatorReport(rotor=3, disobeys=True))
+    aiding = Aiding(height_sigma=sigma)
+    in_doubt = replace(state, record=carries, aiding=aiding, damage=disobeys)
+    assert feel_ground(CONFIG, in_doubt, estimate)[1] is landed
 
 
 @pytest.mark.parametrize(
