@@ -198,7 +198,7 @@ def _run(options: FaultsOptions, cells: list[Cell]) -> int:
     for row in rows:
         if row.differs or len(rows) == 1:
             _say(display, row, summary(row))
-            if options.pairs is not None or options.drawn is not None:
+            if len(rows) > 1:
                 display.say(f"{'':11}again: pandion faults {_again(options, row.cell)}")
     if len(rows) == 1:
         for said in rows[0].flight.texts:
@@ -218,7 +218,7 @@ def _run(options: FaultsOptions, cells: list[Cell]) -> int:
 
 
 def _again(options: FaultsOptions, cell: Cell) -> str:
-    """What flies a drawn cell alone."""
+    """What flies a cell of many alone."""
     name = cell.expected.name
     if options.pairs is None:
         return f"{cell.mode} {name} --seed {cell.seed}"
