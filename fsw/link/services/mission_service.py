@@ -292,8 +292,11 @@ class MissionService(LinkService):
 
     def _clear_all(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[ServiceOutput]:
         number = int(values[2])
-        first = self._available(Kind.MISSION if number == ALL_KINDS else number, peer, t_us)
-        kinds = tuple(Kind) if number == ALL_KINDS else (first,)
+        if number == ALL_KINDS:
+            self._check_idle(number, peer, t_us)
+            kinds = tuple(Kind)
+        else:
+            kinds = (self._available(number, peer, t_us),)
         self._upload = self._download = None
         try:
             upload = self._store.offer(dict.fromkeys(kinds, EMPTY), self.source)
@@ -321,13 +324,17 @@ class MissionService(LinkService):
         """The list of a MAV_MISSION_TYPE, if a transfer of it can begin now; else ``_Refused``."""
         if number not in ROOM:
             raise _Refused(_answer(UNSUPPORTED, number, peer))
+        self._check_idle(number, peer, t_us)
+        return Kind(number)
+
+    def _check_idle(self, number: int, peer: Peer, t_us: int) -> None:
+        """Refuse what another client's transfer is in the way of."""
         upload, download = self._upload, self._download
         if download is not None and t_us - download.last_received_us > SILENCE_US:
             download = self._download = None
         busy = upload or download
         if busy is not None and not self._is_of(busy, peer):
             raise _Refused(_answer(DENIED, number, peer))
-        return Kind(number)
 
     @property
     def _address(self) -> str:

@@ -514,6 +514,7 @@ def test_a_second_ground_station_is_denied_until_the_transfer_has_ended(vehicle:
         second.t_us = first.t_us
         ack = second.ask(message, "MISSION_ACK", patience_s=0.1)
         assert (ack.type, ack.target_system) == (DENIED, 254)
+        assert ack.mission_type == message.mission_type
     first.ask(first.item(WAYPOINTS[2], 0), "MISSION_REQUEST_INT")
     assert first.ask(first.item(WAYPOINTS[3], 1), "MISSION_ACK").type == ACCEPTED
     assert second.upload(TRIANGLE, FENCE) == ACCEPTED
