@@ -10,29 +10,25 @@ from fsw.autopilot.control.cascade import at_rest, in_hover
 from fsw.autopilot.control.press import off_surface
 from fsw.autopilot.control.tube import base_reach
 from fsw.autopilot.flight.commands import arming
-from fsw.autopilot.flight.commands.arming_health import arming_health
 from fsw.autopilot.flight.commands.dedup import answered_before, remember, still_true
 from fsw.autopilot.flight.commands.handlers import Decision, decide, decide_without_estimate
 from fsw.autopilot.flight.failsafe.conditions import NOTHING_DONE, Action
-from fsw.autopilot.flight.failsafe.evidence import FailsafeContext
 from fsw.autopilot.flight.failsafe.response import overridden, respond
-from fsw.autopilot.flight.failsafe.table import BLOCKING, SLOW_US, active, quickly_active, unhealthy
-from fsw.autopilot.flight.land_detector import in_the_air, standing_unclear, stands
-from fsw.autopilot.flight.mission.sequencer import refusal as mission_refusal
+from fsw.autopilot.flight.failsafe.table import SLOW_US, active, quickly_active, unhealthy
+from fsw.autopilot.flight.land_detector import in_the_air, stands
 from fsw.autopilot.flight.modes import MODES
-from fsw.autopilot.flight.modes.base import CONTINUE, CommandContext, FlightMode, Handover
+from fsw.autopilot.flight.modes.base import CONTINUE, FlightMode, Handover
 from fsw.autopilot.flight.modes.hold import stop
 from fsw.autopilot.flight.modes.mission import left as mission_left
 from fsw.autopilot.flight.modes.mission import with_update
-from fsw.autopilot.flight.modes.offboard import current_problem, is_fresh
 from fsw.autopilot.flight.plan_exchange import without_plan
-from fsw.autopilot.flight.restart import rests
 from fsw.autopilot.flight.safety import way_home
 from fsw.autopilot.flight.safety.retreat import retreat_place
 from fsw.autopilot.flight.safety.zone_room import within_room
 from fsw.autopilot.flight.setpoints.generator import PositionGoal, SetpointGenerator
 from fsw.autopilot.flight.setpoints.reference_horizon import ReferenceHorizon
-from fsw.autopilot.flight.state import FlightState, SetpointMemory, VehicleMemory
+from fsw.autopilot.flight.situation import Situation
+from fsw.autopilot.flight.state import FlightState, SetpointMemory
 from fsw.autopilot.model.body import body_of
 from fsw.autopilot.parameters.carrying import payload_range
 from fsw.autopilot.parameters.consistency import loop_tube
@@ -103,7 +99,7 @@ class Commander:
             if before is not None:
                 result = before.result
             else:
-                context = self.context(state, estimate, request.sender)
+                context = self.situation(state, estimate, request.sender, known=known)
                 decision = judge(command, context, self._modes)
                 result = decision.result
                 texts += _reason(decision)
@@ -115,40 +111,17 @@ class Commander:
             acks.append(acknowledgement(command, result))
         return state, acks
 
-    def context(
-        self, state: FlightState, estimate: StateEstimate, sender: Sender | None = None
-    ) -> CommandContext:
-        """The state that a decision on a command may depend on, and what its ``sender`` may not."""
-        limits, vehicle, stream = self._config.limits, state.vehicle, state.mission.stream
-        goal = state.setpoint.goal
-        asked = goal.joints if goal is not None else None
-        return CommandContext(
-            mode=vehicle.mode,
-            landed=vehicle.landed,
-            estimate_valid=state.invalid_ticks == 0,
-            targets_ahead=bool(stream) and stream[-1].t_us >= estimate.t_us,
-            standing_unclear=standing_unclear(self._config, estimate),
-            inconsistent="; ".join(state.mission.refusals),
-            mission=state.mission.flight.progress,
-            mission_refusal=mission_refusal(state.mission.flight, vehicle.landed),
-            setpoint_fresh=is_fresh(self._config, state, estimate.t_us),
-            setpoint_problem=current_problem(self._config, state, estimate.t_us),
-            position=estimate.p_WB,
-            yaw=estimate.yaw,
-            joints=asked or estimate.q_arm,
-            home=vehicle.home,
-            safe_set=state.mission.safe_set,
-            fence=state.mission.fence,
-            against_sender=way_home.against(
-                state.mission, sender, limits.safe_set_owner, armed=vehicle.armed
-            ),
-            now_us=estimate.t_us,
-            config=self._config,
-            health=arming_health(self._config, state, estimate, self._contradiction),
-            blocked=_blocked(vehicle),
-            speed=vehicle.speed or self._config.steering.cruise_speed,
-            rests=rests(state, estimate, limits.aiding_loss_us),
-        )
+    def situation(
+        self,
+        state: FlightState,
+        estimate: StateEstimate,
+        sender: Sender | None = None,
+        *,
+        known: bool = True,
+    ) -> Situation:
+        """What a command of a ``sender``, or a failsafe, is decided on."""
+        laws = self._config, self._contradiction, self._heaviest
+        return Situation(state, estimate, *laws, sender, known)
 
     def arming_report(
         self, state: FlightState, estimate: StateEstimate
@@ -160,7 +133,7 @@ class Commander:
         if state.vehicle.armed:
             sentence, report = "", ArmingReport(ill=unhealthy(state.vehicle.conditions))
         else:
-            found = arming.failed(self.context(state, estimate))
+            found = arming.failed(self.situation(state, estimate))
             report = ArmingReport(tuple([number for number, _ in found]))
             sentence = arming.joined(found) if found else ""
         return sentence, state.arming if report == state.arming else report
@@ -173,9 +146,7 @@ class Commander:
         vehicle = state.vehicle
         if vehicle.mode is Mode.FAULT:
             return state  # what ended the flight stays on show
-        context = FailsafeContext(
-            state, estimate, self._config, self._contradiction, self._heaviest
-        )
+        context = self.situation(state, estimate)
         rows = active(context) if slowly else quickly_active(context)
         before = vehicle.conditions
         if not rows and not before:
@@ -385,7 +356,7 @@ class Commander:
         )
         if intended is Mode.HOLD:
             return state
-        refusal = self._modes[intended].refusal(self.context(state, estimate))
+        refusal = self._modes[intended].refusal(self.situation(state, estimate))
         if refusal is None:
             return self._switch(state, intended, "chosen before arming", estimate, texts)
         texts.append(StatusText(Severity.CRITICAL, refusal))
@@ -435,14 +406,6 @@ def acknowledgement(command: Command, result: int) -> CommandAck:
     """The answer to its sender."""
     request = command.request
     return CommandAck(request.command, result, request.source_system, request.source_component)
-
-
-def _blocked(vehicle: VehicleMemory) -> str:
-    """Why nothing but Descend can be flown now; empty: other modes can be."""
-    if not vehicle.flies or vehicle.mode is not Mode.DESCEND:
-        return ""
-    reasons = [c.value for c in vehicle.conditions if c in BLOCKING]
-    return f"{reasons[0]}; the vehicle descends" if reasons else ""
 
 
 def _lift_off(state: FlightState, estimate: StateEstimate) -> FlightState:

@@ -10,12 +10,14 @@ from typing import Any, Final
 from fsw.autopilot.flight.commands import arming
 from fsw.autopilot.flight.commands.bounds import GRIPPER_OF_PX4, motion_refusal, place_problem
 from fsw.autopilot.flight.commands.dedup import COURSE
-from fsw.autopilot.flight.modes.base import CommandContext, FlightMode
-from fsw.autopilot.flight.restart import RESTARTED
+from fsw.autopilot.flight.failsafe.table import BLOCKING
+from fsw.autopilot.flight.modes.base import FlightMode
+from fsw.autopilot.flight.restart import RESTARTED, rests
 from fsw.autopilot.flight.safety import way_home
 from fsw.autopilot.flight.setpoints.generator import PositionGoal
 from fsw.autopilot.flight.setpoints.offboard_setpoint import joints_refusal
 from fsw.autopilot.flight.setpoints.orbit_path import max_orbit_speed
+from fsw.autopilot.flight.situation import Situation
 from fsw.autopilot.model.arm_coordinates import arm_coordinates
 from fsw.autopilot.model.body import body_of, hull_reach
 from fsw.autopilot.parameters.flight_config import lowest_height
@@ -99,7 +101,7 @@ class Decision:
 Modes = Mapping[Mode, FlightMode]
 
 
-def decide(command: Command, context: CommandContext, modes: Modes) -> Decision:
+def decide(command: Command, context: Situation, modes: Modes) -> Decision:
     """Accept a command with its effects, or refuse it with a reason."""
     action = command.action
     handler = COMMAND_HANDLERS[action if isinstance(action, Order) else type(action)]
@@ -110,15 +112,15 @@ def decide(command: Command, context: CommandContext, modes: Modes) -> Decision:
     return replace(decision, reason=decision.reason.replace("{sender}", sender))
 
 
-def decide_without_estimate(command: Command, context: CommandContext, modes: Modes) -> Decision:
+def decide_without_estimate(command: Command, context: Situation, modes: Modes) -> Decision:
     """The same before the first estimate: what needs one is put off."""
     action = command.action
     if isinstance(action, _NEED_NO_ESTIMATE) or action in _ORDERS_WITHOUT_ESTIMATE:
-        return decide(command, replace(context, estimate_valid=False, rests=True), modes)
+        return decide(command, context, modes)
     return Decision(LATER, "command refused: there is no valid state estimate yet")
 
 
-def _reject(action: Rejected, context: CommandContext, modes: Modes) -> Decision:
+def _reject(action: Rejected, context: Situation, modes: Modes) -> Decision:
     """Refuse a command that the link could not decode.
 
     What is not supported has no reason: ground stations probe for cameras, gimbals and much else,
@@ -127,7 +129,7 @@ def _reject(action: Rejected, context: CommandContext, modes: Modes) -> Decision
     return Decision(action.result, action.reason)
 
 
-def _arm(action: Arm, context: CommandContext, modes: Modes) -> Decision:
+def _arm(action: Arm, context: Situation, modes: Modes) -> Decision:
     if context.mode is Mode.FAULT:
         return Decision(LATER, "arm is not possible while fault: restart the flight software")
     if context.mode is not Mode.DISARMED:
@@ -141,8 +143,8 @@ def _arm(action: Arm, context: CommandContext, modes: Modes) -> Decision:
     return Decision(ACCEPTED, arm=True)
 
 
-def _disarm(action: Disarm, context: CommandContext, modes: Modes) -> Decision:
-    if not _is_armed(context):
+def _disarm(action: Disarm, context: Situation, modes: Modes) -> Decision:
+    if not context.mode.armed:
         return Decision(ACCEPTED)
     if context.landed or _is_above_px4(context):
         return Decision(ACCEPTED, mode=Mode.DISARMED)
@@ -152,11 +154,12 @@ def _disarm(action: Disarm, context: CommandContext, modes: Modes) -> Decision:
     return Decision(ACCEPTED, reason, alarming=True, mode=Mode.DISARMED)
 
 
-def _switch(wanted: Mode, context: CommandContext, modes: Modes) -> Decision:
+def _switch(wanted: Mode, context: Situation, modes: Modes) -> Decision:
     """Change the mode if everything that the new one needs is there."""
     mode = modes[wanted]
-    if context.blocked:
-        return Decision(LATER, f"no {wanted.value}: {context.blocked}")
+    blocked = _blocked(context)
+    if blocked:
+        return Decision(LATER, f"no {wanted.value}: {blocked}")
     denial = mode.denial(context)
     if denial is not None:
         return Decision(DENIED, denial)
@@ -173,15 +176,15 @@ def _switch(wanted: Mode, context: CommandContext, modes: Modes) -> Decision:
     return Decision(ACCEPTED, mode=wanted)
 
 
-def _take_off(action: TakeOff, context: CommandContext, modes: Modes) -> Decision:
+def _take_off(action: TakeOff, context: Situation, modes: Modes) -> Decision:
     """Take off vertically; a command before arming takes effect at arming."""
     decision = _switch(Mode.TAKEOFF, context, modes)
     height = _height(action.to, context)
     if height is None or Mode.TAKEOFF not in (decision.mode, decision.intended_mode):
         return decision
-    here = -context.position[2]
-    least = context.config.limits.airborne_height
-    most = min(context.config.limits.takeoff_climb_most, context.config.steering.highest - here)
+    here = -context.estimate.p_WB[2]
+    least = context.limits.airborne_height
+    most = min(context.limits.takeoff_climb_most, context.config.steering.highest - here)
     climb = height - here
     if not least - _CLIMB_TOLERANCE <= climb <= most + _CLIMB_TOLERANCE:
         range_text = f"{here + least:.1f} to {here + most:.1f} m"
@@ -190,7 +193,7 @@ def _take_off(action: TakeOff, context: CommandContext, modes: Modes) -> Decisio
     return replace(decision, climb=min(max(climb, least), most))
 
 
-def _go_to(action: GoTo, context: CommandContext, modes: Modes) -> Decision:
+def _go_to(action: GoTo, context: Situation, modes: Modes) -> Decision:
     """Hold at another place, height or heading."""
     refusal = _hovering_refusal(context)
     if refusal is not None:
@@ -215,7 +218,7 @@ def _go_to(action: GoTo, context: CommandContext, modes: Modes) -> Decision:
     return replace(decision, goal=PositionGoal(motion, speed=speed), reason=slower)
 
 
-def _orbit(action: FlyOrbit, context: CommandContext, modes: Modes) -> Decision:
+def _orbit(action: FlyOrbit, context: Situation, modes: Modes) -> Decision:
     refusal = _hovering_refusal(context)
     if refusal is not None:
         return Decision(LATER, f"no orbit: {refusal}")
@@ -226,7 +229,8 @@ def _orbit(action: FlyOrbit, context: CommandContext, modes: Modes) -> Decision:
     limits = context.config.steering
     most = max_orbit_speed(radius, limits.yaw_rate, limits.acceleration)
     most = min(most, limits.speed)
-    asked = min(context.speed, most) if action.speed is None else action.speed
+    usual = context.vehicle.speed or limits.cruise_speed
+    asked = min(usual, most) if action.speed is None else action.speed
     decision = _switch(Mode.ORBIT, context, modes)
     if decision.result != ACCEPTED:
         return decision
@@ -239,7 +243,7 @@ def _orbit(action: FlyOrbit, context: CommandContext, modes: Modes) -> Decision:
     return replace(decision, goal=goal, reason=slower if asked > most else "")
 
 
-def _look_at(action: LookAt, context: CommandContext, modes: Modes) -> Decision:
+def _look_at(action: LookAt, context: Situation, modes: Modes) -> Decision:
     """The nose, and so the arm's plane, turns to a place and follows it."""
     if action.place is None:
         return Decision(ACCEPTED, look_at=NewHeading(None))
@@ -247,12 +251,12 @@ def _look_at(action: LookAt, context: CommandContext, modes: Modes) -> Decision:
     far = place_problem(place)
     if far is not None:
         return Decision(DENIED, f"no region of interest: {far}")
-    if not _is_armed(context):
+    if not context.mode.armed:
         return Decision(LATER, "no region of interest: the vehicle is not armed")
     return Decision(ACCEPTED, look_at=NewHeading(place))
 
 
-def _change_speed(action: ChangeSpeed, context: CommandContext, modes: Modes) -> Decision:
+def _change_speed(action: ChangeSpeed, context: Situation, modes: Modes) -> Decision:
     """Change the speed towards position goals; in a mission from the next segment."""
     speed, most = action.speed, context.config.steering.speed
     if speed is not None and not MIN_SPEED <= speed <= most:
@@ -261,14 +265,16 @@ def _change_speed(action: ChangeSpeed, context: CommandContext, modes: Modes) ->
     return Decision(ACCEPTED, speed=action)
 
 
-def _move_joints(action: MoveJoints, context: CommandContext, modes: Modes) -> Decision:
+def _move_joints(action: MoveJoints, context: Situation, modes: Modes) -> Decision:
     """Each joint as a share of the limit of its coordinate, such as of joints 1 and 2 together."""
     refusal = _hovering_refusal(context)
     if refusal is None and context.mode is not Mode.HOLD:
         refusal = f"the arm is not free while {context.mode.value}; hold first"
     if refusal is not None:
         return Decision(LATER, f"joints not moved: {refusal}")
-    arm, q_arm = arm_coordinates(context.config.airframe), list(context.joints)
+    goal = context.state.setpoint.goal
+    asked = goal.joints if goal is not None else None
+    arm, q_arm = arm_coordinates(context.config.airframe), list(asked or context.estimate.q_arm)
     for k, share in enumerate(action.shares):
         if share is None:
             continue
@@ -283,25 +289,28 @@ def _move_joints(action: MoveJoints, context: CommandContext, modes: Modes) -> D
     return Decision(ACCEPTED, joints=tuple(q_arm))
 
 
-def _set_home(action: SetHome, context: CommandContext, modes: Modes) -> Decision:
-    if not context.estimate_valid:
+def _set_home(action: SetHome, context: Situation, modes: Modes) -> Decision:
+    if not context.estimate_is_valid:
         return Decision(LATER, "home not set: the estimate is invalid")
-    place = context.position if action.place is None else _place(action.place, context)
+    place = context.estimate.p_WB if action.place is None else _place(action.place, context)
     north, east, height = *place[:2], -place[2]
-    against = context.against_sender or place_problem(place)
+    mission, owner = context.mission, context.limits.safe_set_owner
+    denied = way_home.against(mission, context.sender, owner, armed=context.mode.armed)
+    against = denied or place_problem(place)
     highest = context.config.steering.highest
     if not against and not height <= highest:
         against = f"{height:.1f} m above the origin is too high; the maximum is {highest:g} m"
-    against = against or way_home.outside(context.fence, (north, east))
+    against = against or way_home.outside(mission.fence, (north, east))
     if against:
         return Decision(DENIED, f"home not set by {{sender}}: {against}")
     where = f"{way_home.told(((north, east),))}, {height:.1f} m above the origin"
-    return Decision(ACCEPTED, f"home set by {{sender}}: {where}", home=Home(place, context.yaw))
+    home = Home(place, context.estimate.yaw)
+    return Decision(ACCEPTED, f"home set by {{sender}}: {where}", home=home)
 
 
-def _start_mission(action: StartMission, context: CommandContext, modes: Modes) -> Decision:
+def _start_mission(action: StartMission, context: Situation, modes: Modes) -> Decision:
     """Start the mission; this arms a disarmed vehicle, as in PX4."""
-    first, total = action.first, context.mission.total
+    first, total = action.first, context.mission.flight.progress.total
     if 0.0 < action.last < total - 1:
         return Decision(DENIED, "no mission: it can only be flown to its last step")
     decision = _switch(Mode.MISSION, context, modes)
@@ -315,31 +324,31 @@ def _start_mission(action: StartMission, context: CommandContext, modes: Modes) 
     return replace(decision, mission_step=int(first))
 
 
-def _set_mission_step(action: SetMissionStep, context: CommandContext, modes: Modes) -> Decision:
-    number, total = action.number, context.mission.total
+def _set_mission_step(action: SetMissionStep, context: Situation, modes: Modes) -> Decision:
+    number, progress = action.number, context.mission.flight.progress
     if number == -1.0:
-        number = 0.0 if action.reset else float(context.mission.current)
-    if not 0.0 <= number < total:
-        return Decision(DENIED, _no_step(number, total))
+        number = 0.0 if action.reset else float(progress.current)
+    if not 0.0 <= number < progress.total:
+        return Decision(DENIED, _no_step(number, progress.total))
     return Decision(ACCEPTED, mission_step=int(number))
 
 
-def _inject_failure(action: InjectFailure, context: CommandContext, modes: Modes) -> Decision:
+def _inject_failure(action: InjectFailure, context: Situation, modes: Modes) -> Decision:
     """The simulator answers; a vehicle without one never does."""
-    if not context.config.limits.failure_injection:
+    if not context.limits.failure_injection:
         return Decision(DENIED, "no failure injected: SYS_FAILURE_EN is 0; set it to 1 to allow it")
     return Decision(CommandResult.IN_PROGRESS)
 
 
-def _grip(action: Grip, context: CommandContext, modes: Modes) -> Decision:
+def _grip(action: Grip, context: Situation, modes: Modes) -> Decision:
     if _is_above_px4(context):
         return Decision(DENIED, GRIPPER_OF_PX4)
     return Decision(ACCEPTED, gripper=1.0 if action.closes else -1.0)
 
 
-def _terminate(action: Order, context: CommandContext, modes: Modes) -> Decision:
+def _terminate(action: Order, context: Situation, modes: Modes) -> Decision:
     """Stop the rotors until the flight software is restarted."""
-    if not _is_armed(context):
+    if not context.mode.armed:
         return Decision(DENIED, "not terminated: the vehicle is not armed")
     if _is_above_px4(context):
         return Decision(DENIED, "not terminated: the rotors are PX4's; terminate it there")
@@ -347,15 +356,15 @@ def _terminate(action: Order, context: CommandContext, modes: Modes) -> Decision
     return Decision(ACCEPTED, reason, alarming=True, mode=Mode.FAULT)
 
 
-def _pause_mission(action: Order, context: CommandContext, modes: Modes) -> Decision:
+def _pause_mission(action: Order, context: Situation, modes: Modes) -> Decision:
     """Hold where the vehicle is."""
     if context.mode not in (Mode.MISSION, Mode.HOLD):
         return Decision(LATER, f"not paused: no mission is flown while {context.mode.value}")
     return _switch(Mode.HOLD, context, modes)
 
 
-def _check_arming(action: Order, context: CommandContext, modes: Modes) -> Decision:
-    if _is_armed(context):
+def _check_arming(action: Order, context: Situation, modes: Modes) -> Decision:
+    if context.mode.armed:
         return Decision(LATER, "no checks: the vehicle is armed")
     refusal = arming.refusal(context)
     if refusal is not None and context.mode is Mode.FAULT:
@@ -363,11 +372,11 @@ def _check_arming(action: Order, context: CommandContext, modes: Modes) -> Decis
     return Decision(ACCEPTED, refusal or "ready to arm")
 
 
-def _restart(action: Order, context: CommandContext, modes: Modes) -> Decision:
+def _restart(action: Order, context: Situation, modes: Modes) -> Decision:
     """Begin anew: what had failed is well again, says the operator."""
-    if _is_armed(context):
+    if context.mode.armed:
         return Decision(DENIED, "not restarted: the vehicle is armed; disarm first")
-    if not context.rests:
+    if context.known and not rests(context.state, context.estimate, context.limits.aiding_loss_us):
         return Decision(LATER, "not restarted: the vehicle must have been at rest for a second")
     if context.mode is Mode.FAULT:
         reason = f"{RESTARTED} by {{sender}}; the termination is over"
@@ -375,7 +384,7 @@ def _restart(action: Order, context: CommandContext, modes: Modes) -> Decision:
     return Decision(ACCEPTED, RESTARTED, restart=True)
 
 
-_Handler = Callable[[Any, CommandContext, Modes], Decision]
+_Handler = Callable[[Any, Situation, Modes], Decision]
 COMMAND_HANDLERS: Final[dict[type[CommandAction] | Order, _Handler]] = {
     Arm: _arm,
     Disarm: _disarm,
@@ -406,37 +415,42 @@ _ORDERS_WITHOUT_ESTIMATE: Final = frozenset(
 )
 
 
-def _is_armed(context: CommandContext) -> bool:
-    return context.mode not in (Mode.DISARMED, Mode.FAULT)
+def _blocked(context: Situation) -> str:
+    """Why nothing but Descend can be flown now; empty: other modes can be."""
+    if not context.vehicle.flies or context.mode is not Mode.DESCEND:
+        return ""
+    reasons = [c.value for c in context.vehicle.conditions if c in BLOCKING]
+    return f"{reasons[0]}; the vehicle descends" if reasons else ""
 
 
-def _is_above_px4(context: CommandContext) -> bool:
+def _is_above_px4(context: Situation) -> bool:
     """PX4 flies: what is disarmed here is given back to it."""
     return context.config.inner == "px4"
 
 
-def _hovering_refusal(context: CommandContext) -> str | None:
+def _hovering_refusal(context: Situation) -> str | None:
     """Why the vehicle cannot accept a position goal now."""
-    if not _is_armed(context):
+    if not context.mode.armed:
         return "the vehicle is not armed"
     return "the vehicle is on the ground; take off first" if context.landed else None
 
 
-def _height(place: Place, context: CommandContext) -> float | None:
+def _height(place: Place, context: Situation) -> float | None:
     """Height above the origin [m], None if the command gives none."""
     if place.height is None or not place.above_home:
         return place.height
-    return place.height - (context.home.p[2] if context.home is not None else 0.0)
+    home = context.vehicle.home
+    return place.height - (home.p[2] if home is not None else 0.0)
 
 
-def _place(place: Place, context: CommandContext) -> Vec3:
+def _place(place: Place, context: Situation) -> Vec3:
     """Position in the local frame [m]; coordinates that are not given stay as they are."""
-    north, east = place.north_east or context.position[:2]
+    north, east = place.north_east or context.estimate.p_WB[:2]
     height = _height(place, context)
-    return north, east, context.position[2] if height is None else -height
+    return north, east, context.estimate.p_WB[2] if height is None else -height
 
 
-def _out_of_bounds(place: Vec3, context: CommandContext) -> str | None:
+def _out_of_bounds(place: Vec3, context: Situation) -> str | None:
     """Why the body is not to be at a place, whatever the safe set."""
     far = place_problem(place)
     if far is not None:
@@ -449,22 +463,23 @@ def _out_of_bounds(place: Vec3, context: CommandContext) -> str | None:
     return None
 
 
-def _too_close(place: Vec3, context: CommandContext) -> str | None:
+def _too_close(place: Vec3, context: Situation) -> str | None:
     body = body_of(context.config.planner.body, context.config.airframe)
-    for number, at in enumerate(surfaces(context.safe_set, place, context.now_us), start=1):
+    found = surfaces(context.mission.safe_set, place, context.estimate.t_us)
+    for number, at in enumerate(found, start=1):
         if not at.distance > hull_reach(body, at.normal):
             return f"the place is too close to zone {number} of the safe set, or beyond it"
     return None
 
 
-def _circle_too_close(centre: Vec3, radius: float, context: CommandContext) -> str | None:
+def _circle_too_close(centre: Vec3, radius: float, context: Situation) -> str | None:
     body = body_of(context.config.planner.body, context.config.airframe)
-    for number in range(len(context.safe_set.zones)):
+    for number in range(len(context.mission.safe_set.zones)):
 
         def room(angle: float, number: int = number) -> float:
             x, y, z = centre
             place = (x + radius * math.cos(angle), y + radius * math.sin(angle), z)
-            at = surface(context.safe_set, number, place, context.now_us)
+            at = surface(context.mission.safe_set, number, place, context.estimate.t_us)
             return 1.0 if at is None else at.distance - hull_reach(body, at.normal)
 
         # The nearest of some places on the circle, then of as many between its neighbours.

@@ -6,7 +6,8 @@ from collections.abc import Callable
 from typing import Final
 
 from fsw.autopilot.flight.failsafe.conditions import Action
-from fsw.autopilot.flight.failsafe.evidence import FailsafeContext, position_is_off
+from fsw.autopilot.flight.failsafe.evidence import position_is_off
+from fsw.autopilot.flight.situation import Situation
 from fsw.autopilot.parameters.registry import BY_NAME
 from fsw.autopilot.signals import BatteryWarning, Mode
 
@@ -26,7 +27,7 @@ _CHOSEN: Final = {
 }
 
 
-def by(name: str) -> Callable[[FailsafeContext], Action]:
+def by(name: str) -> Callable[[Situation], Action]:
     """The action that a parameter chooses; hold, by a number that is none of its own."""
     parameter = BY_NAME[name]
     choices = {number: _CHOSEN[what] for number, what in parameter.choices}
@@ -47,7 +48,7 @@ _EXCEPTIONS: Final = {
 }
 
 
-def on_datalink_lost(context: FailsafeContext) -> Action:
+def on_datalink_lost(context: Situation) -> Action:
     """NAV_DLL_ACT, but for the modes of COM_DLL_EXCEPT."""
     vehicle = context.state.vehicle
     flown = vehicle.failsafe_from or vehicle.mode  # the hold of a failsafe is no hold of a pilot's
@@ -57,7 +58,7 @@ def on_datalink_lost(context: FailsafeContext) -> Action:
     return _ON_DATALINK_LOST(context)
 
 
-def on_battery(context: FailsafeContext) -> Action:
+def on_battery(context: Situation) -> Action:
     """COM_LOW_BAT_ACT: 0 warn, 2 land when critical, 3 return then and land in an emergency."""
     return {
         (2, BatteryWarning.CRITICAL): Action.LAND,
@@ -67,18 +68,18 @@ def on_battery(context: FailsafeContext) -> Action:
     }.get((context.limits.low_battery_action, context.state.battery.charge), Action.WARN)
 
 
-def on_breach(name: str) -> Callable[[FailsafeContext], Action]:
+def on_breach(name: str) -> Callable[[Situation], Action]:
     """The action that a parameter chooses, of a controller whose barriers promise no breach."""
     chosen = by(name)
 
-    def action(context: FailsafeContext) -> Action:
+    def action(context: Situation) -> Action:
         promised = context.config.controller == "blf" and not context.config.soft
         return chosen(context) if promised else Action.WARN
 
     return action
 
 
-def on_lack_of_room(context: FailsafeContext) -> Action:
+def on_lack_of_room(context: Situation) -> Action:
     """Descend where no position is measured: what is lacking only grows."""
     off = position_is_off(context, context.limits.position_low)
     return Action.DESCEND if off else Action.WARN
@@ -87,18 +88,18 @@ def on_lack_of_room(context: FailsafeContext) -> Action:
 _ON_BREACH: Final = on_breach("SAFE_BREACH_ACT")
 
 
-def on_far_outside(context: FailsafeContext) -> Action:
+def on_far_outside(context: Situation) -> Action:
     """Land, where a breach is to be acted on at all."""
     return Action.LAND if _ON_BREACH(context).mode is not None else Action.WARN
 
 
-def on_tilt_lost(context: FailsafeContext) -> Action:
+def on_tilt_lost(context: Situation) -> Action:
     """Terminate, unless CBRK_FLIGHTTERM is set."""
     broken = context.limits.termination_breaker == BREAKER
     return Action.WARN if broken else Action.TERMINATE
 
 
-def on_rotor_lost(context: FailsafeContext) -> Action:
+def on_rotor_lost(context: Situation) -> Action:
     """Terminate, or land where CBRK_FLIGHTTERM is set; what others fly without is a failed one."""
     if context.state.damage.spared:
         return on_rotor_failed(context)
@@ -106,7 +107,7 @@ def on_rotor_lost(context: FailsafeContext) -> Action:
     return Action.LAND if broken else Action.TERMINATE
 
 
-def on_rotor_failed(context: FailsafeContext) -> Action:
+def on_rotor_failed(context: Situation) -> Action:
     """COM_ACT_FAIL_ACT, and land at least where the heading cannot be held."""
     action = on_actuator_failure(context)
     if action is Action.WARN or not context.state.damage.severe:

@@ -8,12 +8,11 @@ from typing import Final
 from fsw.autopilot.estimation.faults.sensor_fault import SensorFault
 from fsw.autopilot.flight.failsafe.conditions import Condition
 from fsw.autopilot.flight.safety.uncertain_clearance import SHORTFALL
-from fsw.autopilot.flight.state import FlightState, LostSensor
+from fsw.autopilot.flight.situation import Situation
+from fsw.autopilot.flight.state import LostSensor
 from fsw.autopilot.measurements import Sensor
-from fsw.autopilot.parameters.flight_config import FlightConfig, FlightLimits
 from fsw.autopilot.periods import TICK_US
-from fsw.autopilot.signals import Mode, StateEstimate
-from fsw.frozen import dataclass
+from fsw.autopilot.signals import Mode
 
 PLAN_STALE_PERIODS: Final = 3
 INVALID_TICKS: Final = 10_000 // TICK_US  # without an estimate
@@ -33,57 +32,30 @@ _HALF_LOST_US: Final = 1_000_000  # in which a half that has jumped may be belie
 _LACKING_US: Final = 500_000  # without room enough; hidden markers, 0.2 s, are none
 
 
-@dataclass(frozen=True, slots=True)
-class FailsafeContext:
-    """What the table looks at, once a tick: all that the vehicle knows, and its limits."""
-
-    state: FlightState
-    estimate: StateEstimate
-    config: FlightConfig
-    against: str = ""  # which parameters contradict each other, whatever the safe set
-    heaviest: float = math.inf  # kg, of a payload that is safe
-
-    @property
-    def limits(self) -> FlightLimits:
-        """Timeouts, and the parameters of actions."""
-        return self.config.limits
-
-    @property
-    def gcs_silent_us(self) -> int:
-        """Time since a ground station was heard."""
-        return self.estimate.t_us - self.state.vehicle.gcs_heard_us
-
-    @property
-    def contradiction(self) -> str:
-        """Which parameters contradict each other, or the safe set in force; empty: none."""
-        refusals = self.state.mission.refusals
-        return "; ".join((self.against, *refusals) if self.against else refusals)
-
-
-def plan_age_us(context: FailsafeContext) -> int:
+def plan_age_us(context: Situation) -> int:
     """Since the running plan began, or the vehicle was taken over."""
     return context.estimate.t_us - context.state.plan.since_us
 
 
-def plans(context: FailsafeContext) -> bool:
+def plans(context: Situation) -> bool:
     """Whether in flight a plan is flown, or should be."""
     vehicle = context.state.vehicle
     return vehicle.unloaded is None and vehicle.mode is not Mode.DESCEND
 
 
-def plan_is_stale(context: FailsafeContext) -> bool:
+def plan_is_stale(context: Situation) -> bool:
     """The running plan (or taking over) began more than three periods ago."""
     stale_us = PLAN_STALE_PERIODS * context.config.planner.period_us
     return plan_age_us(context) > stale_us and plans(context)
 
 
-def planner_is_lost(context: FailsafeContext) -> bool:
+def planner_is_lost(context: Situation) -> bool:
     """No plan has begun for COM_PLN_LOSS_T."""
     unloaded = context.state.vehicle.unloaded is not None
     return not unloaded and plan_age_us(context) > context.limits.planner_loss_us
 
 
-def setpoints_are_lost(context: FailsafeContext) -> bool:
+def setpoints_are_lost(context: Situation) -> bool:
     """In Offboard, or while its failsafe lasts, no setpoint for COM_OF_LOSS_T."""
     vehicle = context.state.vehicle
     if Mode.OFFBOARD is not vehicle.mode and (
@@ -95,66 +67,71 @@ def setpoints_are_lost(context: FailsafeContext) -> bool:
     return not context.state.offboard.is_fresh(context.estimate.t_us, timeout_us)
 
 
-def datalink_is_lost(context: FailsafeContext) -> bool:
+def station_silent_us(context: Situation) -> int:
+    """Time since a ground station was heard."""
+    return context.estimate.t_us - context.state.vehicle.gcs_heard_us
+
+
+def datalink_is_lost(context: Situation) -> bool:
     """There was a ground station, and it has been silent for COM_DL_LOSS_T."""
     if context.state.vehicle.gcs_heard_us < 0:
         return False  # there never was one
-    return context.gcs_silent_us >= context.limits.station_timeout_us
+    return station_silent_us(context) >= context.limits.station_timeout_us
 
 
-def lacks_room(context: FailsafeContext) -> bool:
+def lacks_room(context: Situation) -> bool:
     """For half a second walls have left less than clearances should grow by."""
     kept = context.state.kept
     lasts = context.estimate.t_us - kept.sufficient_us >= _LACKING_US
     return kept.shortfall > SHORTFALL and lasts
 
 
-def force_on_tool(context: FailsafeContext) -> float:
+def force_on_tool(context: Situation) -> float:
     """The normal force [N], as it is observed or by how fast the tool met its surface."""
     k = context.state.record.pressing
     return float(max(k.pressed, k.blow))
 
 
-def presses_too_hard(context: FailsafeContext) -> bool:
+def presses_too_hard(context: Situation) -> bool:
     """The tool may be pressed upon by more than its surface allows."""
     k = context.state.record.pressing
     return bool(k.near and force_on_tool(context) + k.unsure > k.most)
 
 
-def surface_has_moved(context: FailsafeContext) -> bool:
+def surface_has_moved(context: Situation) -> bool:
     """The tool meets its surface far from where it was announced."""
     pressing = context.state.record.pressing
     return bool(pressing.near and abs(pressing.moved) > SURFACE_OFF)
 
 
-def tool_slips(context: FailsafeContext) -> bool:
+def tool_slips(context: Situation) -> bool:
     """The tool moves along its surface faster than any reference leads it."""
     pressing = context.state.record.pressing
     return bool(pressing.contact) and math.hypot(*pressing.slip.tolist()) > SLIP
 
 
-def is_unaided(context: FailsafeContext) -> bool:
+def is_unaided(context: Situation) -> bool:
     """No position could be used for COM_AID_LOSS_T."""
     return context.state.aiding.unaided_us >= context.limits.aiding_loss_us
 
 
-def is_blind(context: FailsafeContext) -> bool:
+def is_blind(context: Situation) -> bool:
     """Nothing is known but what was known: sensors say what is not a number, for example."""
     return context.state.invalid_ticks >= BLIND_TICKS
 
 
-def attitude_is_lost(context: FailsafeContext) -> bool:
+def attitude_is_lost(context: Situation) -> bool:
     """Roll or pitch is uncertain by more than COM_ATT_LOSS, or nothing is known."""
     known = context.state.aiding.attitude_sigma <= context.limits.attitude_loss
     return not known or is_blind(context)
 
 
-def position_is_off(context: FailsafeContext, most: float) -> bool:
+def position_is_off(context: Situation, most: float) -> bool:
     """Positions are missing, and the estimate has drifted by more than ``most`` [m] perhaps."""
     return is_unaided(context) and not context.state.aiding.position_sigma <= most
 
 
-def position_is_disputed(context: FailsafeContext) -> bool:
+def position_is_disputed(context: Situation) -> bool:
     """The estimate is off by COM_POS_LOW_EPH, or positions say so: refused, or by their jumps."""
     aiding, most = context.state.aiding, context.limits.position_low
     if math.hypot(*aiding.unproven) > most:
@@ -162,13 +139,13 @@ def position_is_disputed(context: FailsafeContext) -> bool:
     return is_unaided(context) and not max(aiding.position_sigma, aiding.elsewhere) <= most
 
 
-def lost_sensors(context: FailsafeContext) -> tuple[LostSensor, ...]:
+def lost_sensors(context: Situation) -> tuple[LostSensor, ...]:
     """Those that have been of no use for COM_SENS_LOSS_T, but for those that give the position."""
     since_us = context.estimate.t_us - context.limits.sensor_loss_us
     return tuple([one for one in context.state.aiding.lost if one.since_us <= since_us])
 
 
-def inertial_is_lost(context: FailsafeContext) -> bool:
+def inertial_is_lost(context: Situation) -> bool:
     """The inertial unit was of no use for a while, and no pose holds the attitude.
 
     Satellites and rotors hold it for longer where only one half of the unit is lost.
@@ -183,7 +160,7 @@ def inertial_is_lost(context: FailsafeContext) -> bool:
     )
 
 
-def stands_on_ground(context: FailsafeContext) -> bool:
+def stands_on_ground(context: Situation) -> bool:
     """In flight, rotors have carried for a second too little to fly: the ground does the rest.
 
     Where a descent is commanded the land detector finds it first, and loops are open by then.
@@ -192,7 +169,7 @@ def stands_on_ground(context: FailsafeContext) -> bool:
     return since_us >= 0 and context.estimate.t_us - since_us >= FALLING_US
 
 
-def tilt_is_lost(context: FailsafeContext) -> bool:
+def tilt_is_lost(context: Situation) -> bool:
     """Roll or pitch has been above FD_FAIL_R or FD_FAIL_P for the time of each, PX4's."""
     safety = context.state.safety
     if safety.rolled_us < 0 and safety.pitched_us < 0:
@@ -202,7 +179,7 @@ def tilt_is_lost(context: FailsafeContext) -> bool:
     return over or 0 <= safety.pitched_us <= now_us - limits.pitch_failure_us
 
 
-def way_home_s(context: FailsafeContext) -> float:
+def way_home_s(context: Situation) -> float:
     """Time to return and land from here [s], with RTL_TIME_FACTOR and RTL_TIME_MARGIN."""
     home, limits = context.state.vehicle.home, context.limits
     if home is None:

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 from fsw.autopilot.flight.failsafe.conditions import Action, Condition, FailsafeMemory
-from fsw.autopilot.flight.failsafe.evidence import FailsafeContext, lost_sensors
+from fsw.autopilot.flight.failsafe.evidence import lost_sensors
 from fsw.autopilot.flight.failsafe.table import Failsafe
+from fsw.autopilot.flight.situation import Situation
 from fsw.autopilot.signals import FailsafeEvent, Mode, Severity, StatusText
 
 _SHORT: Final = 1.0  # s
@@ -22,7 +23,7 @@ class Response:
     action: Action = Action.NONE  # to be begun now: one that switches to a mode, or none
 
 
-def respond(context: FailsafeContext, rows: tuple[Failsafe, ...]) -> Response:
+def respond(context: Situation, rows: tuple[Failsafe, ...]) -> Response:
     """The strongest action of the active ``rows``, and what the operator is told.
 
     It is taken where it is stronger than the one in force. So what a condition asks for
@@ -130,7 +131,7 @@ def _is_delayed(row: Failsafe, action: Action) -> bool:
 
 
 def _strongest(
-    context: FailsafeContext, rows: list[Failsafe], actions: dict[Condition, Action]
+    context: Situation, rows: list[Failsafe], actions: dict[Condition, Action]
 ) -> _Choice:
     """Of the ``actions`` of these rows; none, where what is in force is as strong."""
     vehicle, found = context.state.vehicle, _NOTHING
@@ -144,7 +145,7 @@ def _strongest(
 
 
 def _begun(
-    context: FailsafeContext, memory: FailsafeMemory, chosen: _Choice, at_once: _Choice
+    context: Situation, memory: FailsafeMemory, chosen: _Choice, at_once: _Choice
 ) -> tuple[Action, tuple[Failsafe | None, ...], FailsafeMemory]:
     """The action to begin now, the rows that act by it, and the memory with it.
 
@@ -205,7 +206,7 @@ def overridden(memory: FailsafeMemory, conditions: tuple[Condition, ...]) -> Fai
 
 
 def report(
-    row: Failsafe, context: FailsafeContext, action: Action, delay_us: int = 0
+    row: Failsafe, context: Situation, action: Action, delay_us: int = 0
 ) -> tuple[Severity, str]:
     """What the operator reads when a condition becomes active; it acts after ``delay_us`` [us]."""
     text = f"{row.condition.value}{row.detail(context)}"

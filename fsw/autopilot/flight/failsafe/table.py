@@ -21,8 +21,8 @@ from fsw.autopilot.flight.failsafe import actions as actions
 from fsw.autopilot.flight.failsafe import evidence as evidence
 from fsw.autopilot.flight.failsafe import wording as wording
 from fsw.autopilot.flight.failsafe.conditions import Action, Condition
-from fsw.autopilot.flight.failsafe.evidence import FailsafeContext
 from fsw.autopilot.flight.safety.zone_room import is_deep
+from fsw.autopilot.flight.situation import Situation
 from fsw.autopilot.periods import PLANNING_US, TICK_US
 from fsw.autopilot.signals import BatteryWarning, Severity
 
@@ -43,10 +43,10 @@ class Failsafe:
     """One row of the table."""
 
     condition: Condition
-    active: Callable[[FailsafeContext], bool]
-    asks: Action | Callable[[FailsafeContext], Action] = Action.WARN  # what is done
+    active: Callable[[Situation], bool]
+    asks: Action | Callable[[Situation], Action] = Action.WARN  # what is done
     severity: Severity = Severity.WARNING  # of a report without a change of mode
-    detail: Callable[[FailsafeContext], str] = lambda _: ""  # behind the condition's name
+    detail: Callable[[Situation], str] = lambda _: ""  # behind the condition's name
     of_vehicle: bool = False  # a fault of the vehicle, shown by telemetry for as long as it lasts
     in_flight: bool = False  # none on the ground
     slow: bool = False  # looked at once a planning period, not every tick
@@ -56,7 +56,7 @@ class Failsafe:
     component: Subject | None = None  # which is reported as unhealthy while it lasts
     takeover: UserTakeoverAllowed = UserTakeoverAllowed.ALWAYS
 
-    def action(self, context: FailsafeContext) -> Action:
+    def action(self, context: Situation) -> Action:
         """What is done now, if it is active."""
         return self.asks if isinstance(self.asks, Action) else self.asks(context)
 
@@ -384,7 +384,7 @@ FAILSAFES: Final = (
         Condition.DATALINK_LOST,
         evidence.datalink_is_lost,
         actions.on_datalink_lost,
-        detail=lambda c: f" for {c.gcs_silent_us * 1e-6:.0f} s",
+        detail=lambda c: f" for {evidence.station_silent_us(c) * 1e-6:.0f} s",
         slow=True,
         delayed=True,
         within_us=_SLOWLY,
@@ -446,13 +446,13 @@ def unhealthy(conditions: tuple[Condition, ...]) -> tuple[str, ...]:
     return tuple([one.value for one in conditions if ROWS[one].component is not None])
 
 
-def active(context: FailsafeContext) -> tuple[Failsafe, ...]:
+def active(context: Situation) -> tuple[Failsafe, ...]:
     """Rows whose condition is active, in the order of the table; almost always none."""
     flies = context.state.vehicle.flies
     return tuple([row for row in FAILSAFES if (flies or not row.in_flight) and row.active(context)])
 
 
-def quickly_active(context: FailsafeContext) -> tuple[Failsafe, ...]:
+def quickly_active(context: Situation) -> tuple[Failsafe, ...]:
     """The same between two planning periods: the slow rows are as they were found last."""
     vehicle = context.state.vehicle
     before, flies = vehicle.conditions, vehicle.flies

@@ -7,18 +7,18 @@ from typing import Final
 
 from fsw.autopilot.estimation.faults.sensor_fault import sentence
 from fsw.autopilot.flight.failsafe.evidence import (
-    FailsafeContext,
     force_on_tool,
     is_unaided,
     lost_sensors,
     plan_age_us,
     way_home_s,
 )
+from fsw.autopilot.flight.situation import Situation
 from fsw.autopilot.flight.state import is_young
 from fsw.autopilot.signals import SolverStatus
 
 
-def uncertain(context: FailsafeContext) -> str:
+def uncertain(context: Situation) -> str:
     """By how much the position is, and why it is not measured."""
     aiding = context.state.aiding
     if not is_unaided(context):
@@ -26,31 +26,31 @@ def uncertain(context: FailsafeContext) -> str:
     return f" by {1e3 * max(aiding.position_sigma, aiding.elsewhere):.0f} mm{unaided(context)}"
 
 
-def unaided(context: FailsafeContext) -> str:
+def unaided(context: Situation) -> str:
     """Which sensor should give the position, what is wrong with it, and for how long."""
     aiding = context.state.aiding
     return f": {sentence(aiding.pose, aiding.pose_fault)}, for {1e-6 * aiding.unaided_us:.2f} s"
 
 
-def lost_sensor(context: FailsafeContext) -> str:
+def lost_sensor(context: Situation) -> str:
     """Which sensors are lost, each with its fault."""
     now_us = context.estimate.t_us
     return f": {'; '.join([one.sentence(now_us) for one in lost_sensors(context)])}"
 
 
-def suspects(context: FailsafeContext) -> str:
+def suspects(context: Situation) -> str:
     """Which sensors may be wrong, and for how long they have contradicted each other."""
     aiding = context.state.aiding
     return f": {aiding.suspects}, for {1e-6 * aiding.disputed_us:.2f} s"
 
 
-def time_left(context: FailsafeContext) -> str:
+def time_left(context: Situation) -> str:
     """Of the battery, and the time that the way home takes."""
     left = context.state.battery.time_left
     return f": {left:.0f} s left, {way_home_s(context):.0f} s needed for the way home"
 
 
-def tilted(context: FailsafeContext) -> str:
+def tilted(context: Situation) -> str:
     """Which angle is beyond its limit, and for how long."""
     safety, limits = context.state.safety, context.limits
     rolled = safety.rolled_us >= 0
@@ -70,7 +70,7 @@ _PLANNER_FAILS: Final = {
 }
 
 
-def no_plan(context: FailsafeContext) -> str:
+def no_plan(context: Situation) -> str:
     """What the planner does instead of planning, and since when."""
     plan = context.state.plan
     why = "silent" if plan.awaited_missed or not plan.refused else ""
@@ -78,7 +78,7 @@ def no_plan(context: FailsafeContext) -> str:
     return f": planner {why}, last plan {1e-6 * plan_age_us(context):.2f} s ago"
 
 
-def refused_setpoints(context: FailsafeContext) -> str:
+def refused_setpoints(context: Situation) -> str:
     """Why the setpoints that still come are refused; nothing where none comes."""
     memory, timeout_us = context.state.offboard, context.limits.setpoint_timeout_us
     if not is_young(memory.problem_us, context.estimate.t_us, timeout_us):
@@ -86,12 +86,12 @@ def refused_setpoints(context: FailsafeContext) -> str:
     return f": refused: {memory.problem}"
 
 
-def refused_plan(context: FailsafeContext) -> str:
+def refused_plan(context: Situation) -> str:
     """Without a number: it may come and go ten times a second, and is then told once in a while."""
     return f": {_PLANNER_FAILS.get(context.state.plan.status, 'failing')}"
 
 
-def jumped(context: FailsafeContext) -> str:
+def jumped(context: Situation) -> str:
     """By how much time did."""
     jump_us = context.state.safety.jump_us
     if abs(jump_us) < 100_000:
@@ -104,19 +104,19 @@ def by_mm(length: float) -> str:
     return f" by {1e3 * length:.0f} mm"
 
 
-def force(context: FailsafeContext) -> str:
+def force(context: Situation) -> str:
     """How hard the tool is pressed upon, and what is allowed."""
     pressing = context.state.record.pressing
     found, unsure, most = force_on_tool(context), pressing.unsure, pressing.most
     return f": {found:.1f} N, or {unsure:.1f} N more, of {most:.1f} N"
 
 
-def carried(context: FailsafeContext) -> str:
+def carried(context: Situation) -> str:
     """What tells that the ground carries the vehicle, and for how long it has."""
     since_us = context.state.safety.light_us
     return f": rotors carry less than the weight{lasting(context, since_us)}"
 
 
-def lasting(context: FailsafeContext, since_us: int) -> str:
+def lasting(context: Situation, since_us: int) -> str:
     """Since when a condition is so."""
     return f", for {1e-6 * (context.estimate.t_us - since_us):.2f} s"

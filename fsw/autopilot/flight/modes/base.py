@@ -6,25 +6,20 @@ A flight mode is one file in this folder: a subclass of ``FlightMode`` and a nam
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import ClassVar
 
-from fsw.autopilot.flight.commands.arming_health import ArmingHealth
 from fsw.autopilot.flight.land_detector import feel_ground
 from fsw.autopilot.flight.setpoints.generator import PositionGoal, SetpointGenerator
+from fsw.autopilot.flight.situation import Situation
 from fsw.autopilot.flight.state import FlightState, SetpointMemory
 from fsw.autopilot.mpc.reference import still_at
 from fsw.autopilot.parameters.flight_config import FlightConfig
 from fsw.autopilot.signals import (
     EndEffectorTarget,
-    Home,
-    JointVector,
-    MissionProgress,
     Mode,
-    SafeSet,
     StateEstimate,
     StatusText,
-    Vec3,
 )
 from fsw.frozen import replace
 
@@ -41,35 +36,6 @@ class Px4Mode:
     also_standard: int = 0  # MAV_STANDARD_MODE that is understood though not announced
     selectable: bool = True  # offered to the operator; else entered by a command of its own
     offered: bool = True  # announced at all; else no command enters it
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class CommandContext:
-    """What commands, arming checks and the needs of a mode are decided on."""
-
-    mode: Mode
-    landed: bool
-    estimate_valid: bool
-    targets_ahead: bool  # the stream holds a point at or after now
-    standing_unclear: bool  # too high to stand, too low to be surely in the air
-    inconsistent: str  # why the configuration cannot keep the safe set
-    mission: MissionProgress
-    mission_refusal: str | None  # None: it can be flown
-    setpoint_fresh: bool  # an offboard setpoint came within COM_OF_LOSS_T
-    setpoint_problem: str  # why those of that time are refused; empty: none was
-    position: Vec3  # m, of the body
-    yaw: float  # rad
-    joints: JointVector  # rad, asked for last or as they are
-    home: Home | None
-    safe_set: SafeSet
-    now_us: int
-    config: FlightConfig
-    health: ArmingHealth
-    blocked: str  # why nothing but Descend can be flown now; empty: other modes can be
-    speed: float  # m/s, on the way to places
-    rests: bool = True  # it lies or stands still
-    fence: SafeSet = field(default_factory=SafeSet)  # the part of the safe set that was uploaded
-    against_sender: str = ""  # why it may not change where a return ends; empty: it may
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,11 +88,11 @@ class FlightMode:
             return current.mode in self.enter_from
         return current.interruptible or self.interrupts_landing
 
-    def refusal(self, context: CommandContext) -> str | None:
+    def refusal(self, context: Situation) -> str | None:
         """Why the mode cannot be entered now: a condition that it needs is missing."""
         return None
 
-    def denial(self, context: CommandContext) -> str | None:
+    def denial(self, context: Situation) -> str | None:
         """Why this configuration never allows the mode."""
         return None
 

@@ -10,7 +10,6 @@ from fsw.autopilot.flight.mission.sequencer import MissionContext, Stage
 from fsw.autopilot.flight.mission.trajectory_segment import MotionLimits, PushSegment
 from fsw.autopilot.flight.modes.base import (
     CONTINUE,
-    CommandContext,
     FlightMode,
     Handover,
     ModeResult,
@@ -18,6 +17,7 @@ from fsw.autopilot.flight.modes.base import (
 )
 from fsw.autopilot.flight.setpoints.reference_governor import project
 from fsw.autopilot.flight.setpoints.target_check import TargetCheck
+from fsw.autopilot.flight.situation import Situation
 from fsw.autopilot.flight.state import FlightState, SetpointMemory
 from fsw.autopilot.model.kinematics import end_effector
 from fsw.autopilot.mpc.reference import still_at
@@ -49,9 +49,9 @@ class Mission(FlightMode):
         super().__init__(config)
         self._targets = TargetCheck(config, loop_tube(config))
 
-    def refusal(self, context: CommandContext) -> str | None:
+    def refusal(self, context: Situation) -> str | None:
         """Needs a mission that can start or continue."""
-        return context.mission_refusal
+        return sequencer.refusal(context.mission.flight, context.landed)
 
     def activate(
         self, state: FlightState, estimate: StateEstimate, handover: Handover

@@ -8,7 +8,6 @@ from typing import Final
 from fsw.autopilot.flight.land_detector import feel_ground, in_the_air
 from fsw.autopilot.flight.modes.base import (
     CONTINUE,
-    CommandContext,
     FlightMode,
     ModeResult,
     Px4Mode,
@@ -24,6 +23,7 @@ from fsw.autopilot.flight.setpoints.offboard_setpoint import (
     tilted,
     turn_level,
 )
+from fsw.autopilot.flight.situation import Situation
 from fsw.autopilot.flight.state import FlightState, OffboardMemory, SetpointMemory, is_young
 from fsw.autopilot.geometry.vectors import add_scaled
 from fsw.autopilot.model.kinematics import end_effector
@@ -55,12 +55,14 @@ class Offboard(FlightMode):
     before_arming = True
     manual = True
 
-    def refusal(self, context: CommandContext) -> str | None:
+    def refusal(self, context: Situation) -> str | None:
         """Setpoints."""
-        if context.setpoint_fresh:
+        now_us = context.estimate.t_us
+        if is_fresh(self.config, context.state, now_us):
             return None
-        if context.setpoint_problem:
-            return f"not offboard: setpoints are refused: {context.setpoint_problem}"
+        problem = current_problem(self.config, context.state, now_us)
+        if problem:
+            return f"not offboard: setpoints are refused: {problem}"
         timeout = 1e-6 * self.config.limits.setpoint_timeout_us
         return f"not offboard: no setpoint was received in the last {timeout:g} s"
 

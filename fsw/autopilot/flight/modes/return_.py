@@ -5,7 +5,6 @@ from __future__ import annotations
 from fsw.autopilot.flight.mission.sequencer import nearest
 from fsw.autopilot.flight.modes.base import (
     CONTINUE,
-    CommandContext,
     FlightMode,
     Handover,
     ModeResult,
@@ -13,6 +12,7 @@ from fsw.autopilot.flight.modes.base import (
     moved,
 )
 from fsw.autopilot.flight.setpoints.generator import PositionGoal, arrived
+from fsw.autopilot.flight.situation import Situation
 from fsw.autopilot.flight.state import FlightState, SetpointMemory
 from fsw.autopilot.signals import Home, Mode, MotionSetpoint, StateEstimate, Vec3
 from fsw.frozen import replace
@@ -27,7 +27,7 @@ class Return(FlightMode):
     px4 = Px4Mode(4, 5, 5, "rtl", also_standard=5)
     interrupts_landing = True
 
-    def refusal(self, context: CommandContext) -> str | None:
+    def refusal(self, context: Situation) -> str | None:
         """A vehicle in the air."""
         if context.mode is Mode.DISARMED:
             return "no return: the vehicle is not armed"

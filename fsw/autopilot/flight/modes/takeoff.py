@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from fsw.autopilot.flight.modes.base import (
     CONTINUE,
-    CommandContext,
     FlightMode,
     ModeResult,
     Px4Mode,
 )
+from fsw.autopilot.flight.situation import Situation
 from fsw.autopilot.flight.state import FlightState
 from fsw.autopilot.mpc.reference import still_at, vertical_ramp
 from fsw.autopilot.signals import EndEffectorTarget, Mode, StateEstimate
@@ -24,7 +24,7 @@ class Takeoff(FlightMode):
     lifts_off = True
     manual = True
 
-    def refusal(self, context: CommandContext) -> str | None:
+    def refusal(self, context: Situation) -> str | None:
         """A vehicle that stands."""
         if not context.landed and context.mode is not Mode.TAKEOFF:
             return "no takeoff: the vehicle is in the air already"

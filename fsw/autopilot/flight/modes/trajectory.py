@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from fsw.autopilot.flight.modes.base import (
     CONTINUE,
-    CommandContext,
     FlightMode,
     ModeResult,
     Px4Mode,
 )
+from fsw.autopilot.flight.situation import Situation
 from fsw.autopilot.flight.state import FlightState
 from fsw.autopilot.mpc.reference import sample
 from fsw.autopilot.signals import EndEffectorTarget, Mode, StateEstimate
@@ -21,15 +21,17 @@ class Trajectory(FlightMode):
     px4 = Px4Mode(4, 11, 23, "external1")
     external_reference = True
 
-    def denial(self, context: CommandContext) -> str | None:
+    def denial(self, context: Situation) -> str | None:
         """A configuration that can keep the safe set."""
-        return f"no trajectory: {context.inconsistent}" if context.inconsistent else None
+        refusals = context.mission.refusals
+        return f"no trajectory: {'; '.join(refusals)}" if refusals else None
 
-    def refusal(self, context: CommandContext) -> str | None:
+    def refusal(self, context: Situation) -> str | None:
         """A vehicle in the air, and targets."""
         if context.landed:
             return "no trajectory: the vehicle is on the ground; take off first"
-        if not context.targets_ahead:
+        stream = context.mission.stream
+        if not (stream and stream[-1].t_us >= context.estimate.t_us):
             return "no trajectory: no END_EFFECTOR_TARGET ahead of now was received"
         return None
 

@@ -7,7 +7,7 @@ from functools import partial
 
 from fsw.autopilot.flight.commands.handlers import Decision, decide
 from fsw.autopilot.flight.modes import MODES
-from fsw.autopilot.flight.modes.base import CommandContext
+from fsw.autopilot.flight.situation import Situation
 from fsw.autopilot.geometry.geodesy import DEFAULT_ORIGIN, to_local
 from fsw.autopilot.parameters.flight_config import flight_config
 from fsw.autopilot.signals import Command, CommandRequest, Origin
@@ -28,6 +28,6 @@ def command(
     return read_command(request, partial(to_local, origin))
 
 
-def ask(context: CommandContext, number: int, *params: float) -> Decision:
+def ask(context: Situation, number: int, *params: float) -> Decision:
     """What the vehicle decides on a COMMAND_LONG."""
     return decide(command(number, *params), context, FLIGHT_MODES)

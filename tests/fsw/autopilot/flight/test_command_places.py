@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from functools import partial
 
 import pytest
 
 from fsw.autopilot.flight.commands.handlers import Decision, decide
-from fsw.autopilot.flight.modes.base import CommandContext
 from fsw.autopilot.flight.setpoints.generator import PositionGoal
+from fsw.autopilot.flight.situation import Situation
 from fsw.autopilot.geometry.geodesy import to_global, to_local
 from fsw.autopilot.shapes.ball import point
 from fsw.autopilot.shapes.half_space import wall
@@ -26,7 +25,7 @@ from fsw.autopilot.signals import (
 )
 from fsw.link.wire.decode_commands import command as read_command
 from tests.fsw.autopilot.flight.asked import FLIGHT_MODES, ask
-from tests.fsw.autopilot.flight.contexts import STANDING
+from tests.fsw.autopilot.flight.contexts import STANDING, having
 
 ACCEPTED, DENIED = CommandResult.ACCEPTED, CommandResult.DENIED
 TEMPORARILY_REJECTED = CommandResult.TEMPORARILY_REJECTED
@@ -34,7 +33,7 @@ NAN = math.nan
 ORIGIN = Origin(48.0, 11.0, 500.0)
 HOME = Home((3.0, 4.0, -0.32), 0.0)
 HERE = (1.0, 2.0, -5.0)
-HOVERING = replace(STANDING, mode=Mode.HOLD, landed=False, position=HERE, home=HOME)
+HOVERING = having(STANDING, mode=Mode.HOLD, landed=False, p_WB=HERE, home=HOME)
 GOTO, SET_HOME, SET_ACTUATOR, MAY_SWITCH = 192, 179, 187, 1.0
 
 
@@ -45,7 +44,7 @@ def decided(
     frame: int | None,
     *first: float,
     command: int = GOTO,
-    context: CommandContext = HOVERING,
+    context: Situation = HOVERING,
 ) -> Decision:
     """On a command that names a place in parameters 5 to 7."""
     p = (*first, *(NAN,) * (4 - len(first)))
@@ -115,16 +114,16 @@ def test_a_goto_carries_its_place_speed_and_heading() -> None:
 
 
 def test_a_goto_out_of_another_mode_must_ask_for_the_change() -> None:
-    offboard = replace(HOVERING, mode=Mode.OFFBOARD)
+    offboard = having(HOVERING, mode=Mode.OFFBOARD)
     assert decided(7.0, 8.0, -3.0, 1, context=offboard).result == TEMPORARILY_REJECTED
     decision = decided(7.0, 8.0, -3.0, 1, NAN, MAY_SWITCH, context=offboard)
     assert (decision.result, decision.mode) == (ACCEPTED, Mode.HOLD)
-    on_ground = replace(HOVERING, landed=True)
+    on_ground = having(HOVERING, landed=True)
     assert "ground" in decided(7.0, 8.0, -3.0, 1, context=on_ground).reason
 
 
 def test_a_goto_into_a_wall_or_the_ground_is_refused() -> None:
-    walled = replace(HOVERING, safe_set=SafeSet((wall((-1.0, 0.0, 0.0), -10.0, 0.5),)))
+    walled = having(HOVERING, safe_set=SafeSet((wall((-1.0, 0.0, 0.0), -10.0, 0.5),)))
     assert decided(9.0, 0.0, -3.0, 1, context=walled).result == ACCEPTED
     for x, z, word in ((9.6, -3.0, "zone 1"), (30.0, -3.0, "zone 1"), (5.0, -0.2, "too low")):
         decision = decided(x, 0.0, z, 1, context=walled)
@@ -134,7 +133,7 @@ def test_a_goto_into_a_wall_or_the_ground_is_refused() -> None:
 
 def test_a_goto_too_close_to_a_point_is_refused() -> None:
     branch = point((9.0, 0.0, -3.0), 0.5)
-    near = replace(HOVERING, safe_set=SafeSet((branch,)))
+    near = having(HOVERING, safe_set=SafeSet((branch,)))
     assert decided(9.0, 0.6, -3.0, 1, context=near).result == ACCEPTED
     decision = decided(9.0, 0.4, -3.0, 1, context=near)
     assert decision.result == DENIED

@@ -11,6 +11,7 @@ import pytest
 
 from fsw.autopilot.flight.commander import Commander
 from fsw.autopilot.flight.commands.arming import CHECKS, Subject
+from fsw.autopilot.flight.commands.handlers import decide
 from fsw.autopilot.flight.failsafe.conditions import Condition
 from fsw.autopilot.flight.modes.land import Land
 from fsw.autopilot.flight.safety import way_home
@@ -28,7 +29,6 @@ from fsw.autopilot.signals import (
     VEHICLE_PILOT,
     Arm,
     ArmingReport,
-    BatteryState,
     ChangeSpeed,
     Command,
     CommandAction,
@@ -38,6 +38,7 @@ from fsw.autopilot.signals import (
     FlyOrbit,
     GoTo,
     Home,
+    JointVector,
     LookAt,
     Mode,
     MotionSetpoint,
@@ -53,7 +54,8 @@ from fsw.autopilot.signals import (
     TakeOff,
     Vec3,
 )
-from tests.fsw.autopilot.flight.in_flight import CONFIG, GROUND_Z, HOME, flying, vehicle_at
+from tests.fsw.autopilot.flight.asked import FLIGHT_MODES
+from tests.fsw.autopilot.flight.in_flight import CONFIG, GROUND_Z, flying, vehicle_at
 from tests.fsw.paper_arm import LIMIT1
 from tests.fsw.records import with_record
 
@@ -116,25 +118,29 @@ def test_targets_are_ahead_until_the_last_one(times_us: tuple[int, ...], ahead: 
     stream = tuple(still_at(HERE, t_us) for t_us in times_us)
     state = flying()
     state = replace(state, mission=replace(state.mission, stream=stream))
-    assert COMMANDER.context(state, HOVERING).targets_ahead is ahead
+    refusal = FLIGHT_MODES[Mode.TRAJECTORY].refusal(COMMANDER.situation(state, HOVERING))
+    assert (refusal is None) is ahead
+    assert ahead or "no END_EFFECTOR_TARGET ahead of now" in (refusal or "")
 
 
 def test_joints_are_those_asked_for_or_else_those_measured() -> None:
-    assert COMMANDER.context(steered(), HOVERING).joints == (0.3, 0.1)
-    free = steered(PositionGoal(MotionSetpoint(False, HERE)))
-    assert COMMANDER.context(free, HOVERING).joints == HOVERING.q_arm
-    assert COMMANDER.context(flying(), HOVERING).joints == HOVERING.q_arm
+    def kept(state: FlightState) -> JointVector | None:
+        left = Command(MoveJoints((None, None)), CommandRequest(187, (math.nan,) * 7, 255, 190))
+        return decide(left, COMMANDER.situation(state, HOVERING), FLIGHT_MODES).joints
+
+    assert kept(steered()) == (0.3, 0.1)
+    assert kept(steered(PositionGoal(MotionSetpoint(False, HERE)))) == HOVERING.q_arm
+    assert kept(flying()) == HOVERING.q_arm
 
 
 def test_what_a_decision_depends_on_is_the_vehicle_s() -> None:
-    state = flying(speed=0.4)
-    state = replace(state, battery=BatteryState(remaining=0.3), invalid_ticks=1)
-    context = COMMANDER.context(state, HOVERING)
-    assert (context.position, context.yaw, context.home) == (HERE, 0.5, HOME)
-    assert (context.speed, context.health.remaining) == (0.4, 0.3)
-    assert not context.estimate_valid
-    usual = COMMANDER.context(flying(), HOVERING)
-    assert (usual.speed, usual.estimate_valid) == (CONFIG.steering.cruise_speed, True)
+    state = replace(flying(speed=0.4), invalid_ticks=1)
+    situation = COMMANDER.situation(state, HOVERING, (255, 190))
+    assert (situation.state, situation.estimate, situation.config) == (state, HOVERING, CONFIG)
+    assert (situation.vehicle, situation.mission) == (state.vehicle, state.mission)
+    assert (situation.sender, situation.estimate_is_valid) == ((255, 190), False)
+    assert COMMANDER.situation(flying(), HOVERING).estimate_is_valid
+    assert not COMMANDER.situation(flying(), HOVERING, known=False).estimate_is_valid
 
 
 def test_what_is_ill_is_shown_while_the_vehicle_is_armed() -> None:

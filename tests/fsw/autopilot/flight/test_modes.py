@@ -80,7 +80,7 @@ def test_any_other_mode_is_interrupted_by_any(mode: Mode, wanted: Mode) -> None:
 
 
 def test_an_inconsistent_configuration_follows_no_trajectory() -> None:
-    decision = ask(flying(inconsistent="too small"), SET_MODE, *custom(Mode.TRAJECTORY))
+    decision = ask(flying(refusals=("too small",)), SET_MODE, *custom(Mode.TRAJECTORY))
     assert decision.result == DENIED
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import pytest
@@ -11,13 +12,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fsw.autopilot.flight.commands.handlers import Decision, NewHeading, decide
-from fsw.autopilot.flight.modes.base import CommandContext
+from fsw.autopilot.flight.failsafe.conditions import Condition
+from fsw.autopilot.flight.situation import Situation
 from fsw.autopilot.parameters.flight_config import flight_config
 from fsw.autopilot.shapes.ball import point
 from fsw.autopilot.shapes.half_space import wall
 from fsw.autopilot.shapes.vertical_cylinder import column
 from fsw.autopilot.signals import (
     MAX_DISTANCE,
+    BatteryState,
     ChangeSpeed,
     Command,
     CommandAction,
@@ -44,7 +47,15 @@ from fsw.autopilot.signals import (
 )
 from fsw.link.wire.decode_commands import _READERS
 from tests.fsw.autopilot.flight.asked import FLIGHT_MODES, ask
-from tests.fsw.autopilot.flight.contexts import STANDING, tuned_by
+from tests.fsw.autopilot.flight.contexts import (
+    AHEAD,
+    FRESH,
+    LOW,
+    MISSION,
+    STANDING,
+    having,
+    tuned_by,
+)
 from vehicles.vehicle_file import load_vehicle, vehicle_names
 
 ACCEPTED, DENIED = CommandResult.ACCEPTED, CommandResult.DENIED
@@ -53,8 +64,8 @@ UNSUPPORTED = CommandResult.UNSUPPORTED
 NAN = math.nan
 ARM, TAKEOFF, LAND, SET_MODE, SHUTDOWN = 400, 22, 21, 176, 246
 
-IDLING = replace(STANDING, mode=Mode.HOLD)
-HOLDING = replace(STANDING, mode=Mode.HOLD, landed=False, targets_ahead=True)
+IDLING = having(STANDING, mode=Mode.HOLD)
+HOLDING = having(STANDING, mode=Mode.HOLD, landed=False, stream=AHEAD)
 
 
 @pytest.mark.parametrize(
@@ -67,11 +78,11 @@ HOLDING = replace(STANDING, mode=Mode.HOLD, landed=False, targets_ahead=True)
         (HOLDING, SET_MODE, (1.0, 4.0, 6.0), Mode.LAND),
         (HOLDING, SET_MODE, (157.0, 4.0, 6.0), Mode.LAND),  # what a HEARTBEAT has, and armed
         (HOLDING, SET_MODE, (1.0, 4.0, 11.0), Mode.TRAJECTORY),
-        (replace(HOLDING, mode=Mode.TRAJECTORY), SET_MODE, (1.0, 4.0, 3.0), Mode.HOLD),
+        (having(HOLDING, mode=Mode.TRAJECTORY), SET_MODE, (1.0, 4.0, 3.0), Mode.HOLD),
     ],
 )
 def test_a_command_in_order_switches_to_its_mode_whatever_unused_parameters_hold(
-    situation: CommandContext, command: int, params: tuple[float, ...], mode: Mode
+    situation: Situation, command: int, params: tuple[float, ...], mode: Mode
 ) -> None:
     assert ask(situation, command, *params) == Decision(ACCEPTED, mode=mode)
 
@@ -88,29 +99,29 @@ def test_a_disarm_in_the_air_needs_force_and_is_told_loudly() -> None:
 
 @pytest.mark.requirement("REQ-ARM-1")
 def test_arming_by_force_says_what_it_ignores_and_never_ignores_the_estimate() -> None:
-    broken = replace(STANDING, inconsistent="the sphere is too small", standing_unclear=True)
+    broken = having(STANDING, refusals=("the sphere is too small",), p_WB=LOW)
     decision = ask(broken, ARM, 1.0, 21196.0)
     assert (decision.result, decision.arm, decision.alarming) == (ACCEPTED, True, True)
     assert "by force" in decision.reason
-    assert ask(replace(broken, estimate_valid=False), ARM, 1.0, 21196.0).arm is False
+    assert ask(having(broken, invalid_ticks=1), ARM, 1.0, 21196.0).arm is False
     assert ask(STANDING, ARM, 1.0, 21196.0) == Decision(ACCEPTED, arm=True)
 
 
 @pytest.mark.parametrize(
     ("situation", "command", "params", "word"),
     [
-        (replace(STANDING, estimate_valid=False), ARM, (1.0,), "estimate"),
-        (replace(STANDING, mode=Mode.FAULT), ARM, (1.0,), "fault"),
+        (having(STANDING, invalid_ticks=1), ARM, (1.0,), "estimate"),
+        (having(STANDING, mode=Mode.FAULT), ARM, (1.0,), "fault"),
         (HOLDING, ARM, (0.0,), "air"),
         (HOLDING, TAKEOFF, (), "air"),
         (STANDING, LAND, (), "disarmed"),
         (IDLING, SET_MODE, (1.0, 4.0, 11.0), "ground"),
-        (replace(HOLDING, targets_ahead=False), SET_MODE, (1.0, 4.0, 11.0), "END_EFFECTOR_TARGET"),
-        (replace(HOLDING, mode=Mode.LAND), SET_MODE, (1.0, 4.0, 11.0), "land"),
+        (having(HOLDING, stream=()), SET_MODE, (1.0, 4.0, 11.0), "END_EFFECTOR_TARGET"),
+        (having(HOLDING, mode=Mode.LAND), SET_MODE, (1.0, 4.0, 11.0), "land"),
     ],
 )
 def test_a_command_out_of_place_is_refused_with_a_reason(
-    situation: CommandContext, command: int, params: tuple[float, ...], word: str
+    situation: Situation, command: int, params: tuple[float, ...], word: str
 ) -> None:
     decision = ask(situation, command, *params)
     assert (decision.result, decision.mode) == (TEMPORARILY_REJECTED, None)
@@ -155,12 +166,12 @@ def test_an_unknown_command_is_unsupported_without_a_text(command: int) -> None:
         (HOLDING, ARM, (1.0,)),
         (STANDING, ARM, (0.0,)),
         (HOLDING, SET_MODE, (1.0, 4.0, 3.0)),
-        (replace(HOLDING, mode=Mode.TRAJECTORY), SET_MODE, (1.0, 4.0, 11.0)),
-        (replace(HOLDING, mode=Mode.LAND), LAND, ()),
+        (having(HOLDING, mode=Mode.TRAJECTORY), SET_MODE, (1.0, 4.0, 11.0)),
+        (having(HOLDING, mode=Mode.LAND), LAND, ()),
     ],
 )
 def test_asking_again_for_what_is_so_is_accepted_and_changes_nothing(
-    situation: CommandContext, command: int, params: tuple[float, ...]
+    situation: Situation, command: int, params: tuple[float, ...]
 ) -> None:
     decision = ask(situation, command, *params)
     assert (decision.result, decision.mode, decision.reason) == (ACCEPTED, None, "")
@@ -182,7 +193,7 @@ def test_shutdown_belongs_to_the_simulator_s_link_alone() -> None:
 def test_a_takeoff_goes_to_a_height_above_where_the_vehicle_stands(
     height: float, accepted: bool
 ) -> None:
-    standing = replace(STANDING, mode=Mode.HOLD, position=(0.0, 0.0, -0.32))
+    standing = having(STANDING, mode=Mode.HOLD, p_WB=(0.0, 0.0, -0.32))
     decision = ask(standing, TAKEOFF, *[math.nan] * 6, height)
     assert (decision.mode is Mode.TAKEOFF) is accepted
     assert accepted or "height" in decision.reason
@@ -203,17 +214,17 @@ def test_a_takeoff_goes_to_a_height_above_where_the_vehicle_stands(
 def test_a_mode_can_be_chosen_before_arming(
     command: int, params: tuple[float, ...], intended: Mode
 ) -> None:
-    ready = replace(STANDING, mission_refusal=None, setpoint_fresh=True, position=(0.0, 0.0, -0.3))
+    ready = having(STANDING, flight=MISSION, offboard=FRESH, p_WB=(0.0, 0.0, -0.3))
     decision = ask(ready, command, *params)
     assert (decision.result, decision.mode, decision.intended_mode) == (ACCEPTED, None, intended)
     assert decision.climb == (pytest.approx(1.7) if command == TAKEOFF else None)
 
 
 def test_starting_a_mission_arms_where_arming_is_possible() -> None:
-    ready = replace(STANDING, mission_refusal=None)
+    ready = having(STANDING, flight=MISSION)
     decision = ask(ready, 300, 0.0, 0.0)
     assert (decision.arm, decision.intended_mode) == (True, Mode.MISSION)
-    blind = ask(replace(ready, estimate_valid=False), 300, 0.0, 0.0)
+    blind = ask(having(ready, invalid_ticks=1), 300, 0.0, 0.0)
     assert (blind.result, blind.arm, blind.intended_mode) == (TEMPORARILY_REJECTED, False, None)
     assert "estimate" in blind.reason
     without = ask(STANDING, 300, 0.0, 0.0)
@@ -222,27 +233,21 @@ def test_starting_a_mission_arms_where_arming_is_possible() -> None:
 
 @pytest.mark.parametrize("remaining", [0.0, 0.09])
 def test_an_empty_battery_forbids_arming(remaining: float) -> None:
-    decision = ask(
-        replace(STANDING, health=replace(STANDING.health, remaining=remaining)), ARM, 1.0
-    )
+    decision = ask(having(STANDING, battery=BatteryState(remaining=remaining)), ARM, 1.0)
     assert decision.result == TEMPORARILY_REJECTED
     assert "battery" in decision.reason
-    assert ask(replace(STANDING, health=replace(STANDING.health, remaining=0.1)), ARM, 1.0).arm
+    assert ask(having(STANDING, battery=BatteryState(remaining=0.1)), ARM, 1.0).arm
 
 
 @pytest.mark.requirement("REQ-MODE-5")
 @pytest.mark.parametrize("wanted", [Mode.HOLD, Mode.RETURN, Mode.LAND, Mode.OFFBOARD])
 def test_while_nothing_else_can_be_flown_every_mode_is_refused(wanted: Mode) -> None:
-    blocked = replace(
-        HOLDING,
-        mode=Mode.DESCEND,
-        setpoint_fresh=True,
-        blocked="position unknown; the vehicle descends",
-    )
+    lost = (Condition.POSITION_LOST,)
+    blocked = having(HOLDING, mode=Mode.DESCEND, offboard=FRESH, conditions=lost)
     decision = decided(SwitchMode(wanted), blocked)
     assert decision.result == TEMPORARILY_REJECTED
     assert decision.reason == f"no {wanted.value}: position unknown; the vehicle descends"
-    assert decided(SwitchMode(wanted), replace(blocked, blocked="")).mode is wanted
+    assert decided(SwitchMode(wanted), having(blocked, conditions=())).mode is wanted
     assert ask(blocked, 185, 1.0).mode is Mode.FAULT
 
 
@@ -263,28 +268,28 @@ def test_an_actuator_test_is_refused_with_a_reason(command: int) -> None:
 
 def test_the_checks_before_arming_can_be_asked_for() -> None:
     assert ask(STANDING, 401).reason == "ready to arm"
-    assert "estimate" in ask(replace(STANDING, estimate_valid=False), 401).reason
+    assert "estimate" in ask(having(STANDING, invalid_ticks=1), 401).reason
     assert ask(HOLDING, 401).result == TEMPORARILY_REJECTED
 
 
 def test_an_inconsistent_safe_set_forbids_arming_and_following() -> None:
     for situation, command in ((STANDING, (ARM, 1.0)), (HOLDING, (SET_MODE, 1.0, 4.0, 11.0))):
-        decision = ask(replace(situation, inconsistent="the sphere is too small"), *command)
+        decision = ask(having(situation, refusals=("the sphere is too small",)), *command)
         assert decision.result == DENIED
         assert "too small" in decision.reason
 
 
 def test_a_terminated_vehicle_is_disarmed_already() -> None:
-    assert ask(replace(HOLDING, mode=Mode.FAULT), ARM, 0.0) == Decision(ACCEPTED)
+    assert ask(having(HOLDING, mode=Mode.FAULT), ARM, 0.0) == Decision(ACCEPTED)
 
 
-def drawn(**vehicle: Any) -> st.SearchStrategy[CommandContext]:
+def drawn(**vehicle: Any) -> st.SearchStrategy[Situation]:
     return st.builds(
-        CommandContext,
+        partial(having, STANDING),
         mode=st.sampled_from(Mode),
         landed=st.booleans(),
-        estimate_valid=st.booleans(),
-        targets_ahead=st.booleans(),
+        invalid_ticks=st.integers(0, 1),
+        stream=st.sampled_from([(), AHEAD]),
         **vehicle,
     )
 
@@ -298,7 +303,7 @@ params = st.tuples(*[st.floats(allow_nan=True, allow_infinity=True)] * 7)
 
 @given(commands, params, situations)
 def test_whatever_arrives_is_answered_and_a_mode_can_always_follow(
-    command: int, values: Seven, situation: CommandContext
+    command: int, values: Seven, situation: Situation
 ) -> None:
     decision = ask(situation, command, *values)
     if decision.mode in FLIGHT_MODES:
@@ -312,20 +317,20 @@ def test_whatever_arrives_is_answered_and_a_mode_can_always_follow(
 
 @pytest.mark.requirement("REQ-MODE-8")
 @given(situations)
-def test_a_vehicle_in_the_air_is_not_disarmed_unless_forced(situation: CommandContext) -> None:
-    decision = ask(replace(situation, landed=False), ARM, 0.0)
+def test_a_vehicle_in_the_air_is_not_disarmed_unless_forced(situation: Situation) -> None:
+    decision = ask(having(situation, landed=False), ARM, 0.0)
     assert decision.mode is None
 
 
 # ---------------------------------------------------------------- actions, as the link decodes them
 
 REQUEST = CommandRequest(0, (NAN,) * 7, 255, 190)
-HIGH = replace(HOLDING, position=(1.0, 2.0, -5.0), home=Home((0.0, 0.0, -0.5), 0.0))
+HIGH = having(HOLDING, p_WB=(1.0, 2.0, -5.0), home=Home((0.0, 0.0, -0.5), 0.0))
 CIRCLE = FlyOrbit(Place((4.0, 6.0), 5.0), 2.0)
-WALLED = replace(HIGH, safe_set=SafeSet((wall((-1.0, 0.0, 0.0), -10.0, 0.5),)))
+WALLED = having(HIGH, safe_set=SafeSet((wall((-1.0, 0.0, 0.0), -10.0, 0.5),)))
 
 
-def decided(action: CommandAction, context: CommandContext = HIGH) -> Decision:
+def decided(action: CommandAction, context: Situation = HIGH) -> Decision:
     return decide(Command(action, REQUEST), context, FLIGHT_MODES)
 
 
@@ -336,7 +341,7 @@ def test_an_orbit_is_flown_around_its_place_in_its_mode() -> None:
     assert goal is not None
     assert goal.orbit == Orbit((4.0, 6.0, -5.0), 2.0, 0.3, False, Facing.TANGENT)
     assert goal.motion.p == (4.0, 6.0, -5.0)
-    again = decided(CIRCLE, replace(HIGH, mode=Mode.ORBIT))
+    again = decided(CIRCLE, having(HIGH, mode=Mode.ORBIT))
     assert (again.result, again.mode, again.goal is not None) == (ACCEPTED, None, True)
 
 
@@ -349,7 +354,7 @@ def test_an_orbit_is_as_fast_as_asked_or_as_the_nose_can_turn_which_is_said(
     asked: float | None, usual: float, flown: float, slower: bool
 ) -> None:
     """A radius of 2 m at a turn rate of 0.3 rad/s, of which a fifth is kept for corrections."""
-    decision = decided(replace(CIRCLE, speed=asked), replace(HIGH, speed=usual))
+    decision = decided(replace(CIRCLE, speed=asked), having(HIGH, speed=usual))
     assert decision.goal is not None
     assert decision.goal.orbit is not None
     assert decision.goal.orbit.speed == pytest.approx(flown)
@@ -366,18 +371,18 @@ def test_no_orbit_is_faster_than_the_vehicle_however_wide() -> None:
 @pytest.mark.parametrize(
     ("context", "result", "word"),
     [
-        (replace(HIGH, mode=Mode.LAND), TEMPORARILY_REJECTED, "not possible while land"),
+        (having(HIGH, mode=Mode.LAND), TEMPORARILY_REJECTED, "not possible while land"),
         (
-            replace(HIGH, landed=True),
+            having(HIGH, landed=True),
             TEMPORARILY_REJECTED,
             "no orbit: the vehicle is on the ground",
         ),
-        (replace(HIGH, mode=Mode.DISARMED), TEMPORARILY_REJECTED, "no orbit: the vehicle is not"),
+        (having(HIGH, mode=Mode.DISARMED), TEMPORARILY_REJECTED, "no orbit: the vehicle is not"),
         (tuned_by(HIGH, "limits.airborne_height", 5.0), DENIED, "no orbit: 5.0 m"),
     ],
 )
 def test_an_orbit_that_cannot_be_flown_now_is_refused(
-    context: CommandContext, result: CommandResult, word: str
+    context: Situation, result: CommandResult, word: str
 ) -> None:
     decision = decided(CIRCLE, context)
     assert (decision.result, decision.goal, decision.mode) == (result, None, None)
@@ -403,7 +408,7 @@ def test_a_circle_keeps_the_clearance_of_a_wall_with_its_nearest_point(
 
 
 def test_a_circle_is_wider_than_a_slanted_wall_sees_it_only_along_the_ground() -> None:
-    slanted = replace(HIGH, safe_set=SafeSet((wall((0.6, 0.0, -0.8), 0.0, 0.5),)))  # rises north
+    slanted = having(HIGH, safe_set=SafeSet((wall((0.6, 0.0, -0.8), 0.0, 0.5),)))  # rises north
     assert decided(FlyOrbit(Place((0.0, 0.0), 5.0), 5.8), slanted).result == ACCEPTED
     assert decided(FlyOrbit(Place((0.0, 0.0), 5.0), 5.9), slanted).result == DENIED
 
@@ -424,7 +429,7 @@ def test_a_circle_is_wider_than_a_slanted_wall_sees_it_only_along_the_ground() -
 def test_a_circle_keeps_clear_of_points_beside_above_and_inside(
     obstacle: Zone, refused: bool
 ) -> None:
-    decision = decided(CIRCLE, replace(HIGH, safe_set=SafeSet((obstacle,))))
+    decision = decided(CIRCLE, having(HIGH, safe_set=SafeSet((obstacle,))))
     assert (decision.result == DENIED) is refused
     assert ("zone 1" in decision.reason) is refused
 
@@ -442,7 +447,7 @@ def test_the_nose_is_turned_to_a_place_of_an_armed_vehicle_and_freed_anywhere() 
     look = LookAt(Place((3.0, 4.0), 1.0))
     assert decided(look).look_at == NewHeading((3.0, 4.0, -1.0))
     assert decided(look, STANDING).result == TEMPORARILY_REJECTED
-    assert decided(look, replace(HIGH, mode=Mode.FAULT)).result == TEMPORARILY_REJECTED
+    assert decided(look, having(HIGH, mode=Mode.FAULT)).result == TEMPORARILY_REJECTED
     assert decided(LookAt(Place((MAX_DISTANCE, 1.0), 0.0))).result == DENIED
     assert decided(LookAt(Place((MAX_DISTANCE, 0.0), 0.0))).result == ACCEPTED
     assert decided(LookAt(None), STANDING) == Decision(ACCEPTED, look_at=NewHeading(None))
@@ -455,7 +460,7 @@ def test_the_nose_is_turned_to_a_place_of_an_armed_vehicle_and_freed_anywhere() 
 def test_a_takeoff_climbs_to_its_height_within_what_a_ground_station_rounds(
     height: float, climb: float | None
 ) -> None:
-    standing = replace(HIGH, landed=True)
+    standing = having(HIGH, landed=True)
     decision = decided(TakeOff(Place(height=height)), standing)
     assert decision.climb == (None if climb is None else pytest.approx(climb))
     if climb is None:
@@ -465,9 +470,9 @@ def test_a_takeoff_climbs_to_its_height_within_what_a_ground_station_rounds(
     assert above_home.climb == decision.climb or above_home.climb == pytest.approx(decision.climb)
 
 
-@pytest.mark.parametrize("home", [None, HIGH.home])
+@pytest.mark.parametrize("home", [None, HIGH.vehicle.home])
 def test_a_height_above_home_needs_a_home_or_counts_from_the_origin(home: Home | None) -> None:
-    goal = decided(GoTo(Place((1.0, 1.0), 3.0, above_home=True)), replace(HIGH, home=home)).goal
+    goal = decided(GoTo(Place((1.0, 1.0), 3.0, above_home=True)), having(HIGH, home=home)).goal
     assert goal is not None
     assert goal.motion.p == (1.0, 1.0, -3.0 if home is None else -3.5)
 
@@ -475,12 +480,12 @@ def test_a_height_above_home_needs_a_home_or_counts_from_the_origin(home: Home |
 def test_a_place_without_coordinates_is_the_present_one() -> None:
     goal = decided(GoTo(Place(), yaw=0.3)).goal
     assert goal is not None
-    assert (goal.motion.p, goal.motion.yaw) == (HIGH.position, 0.3)
+    assert (goal.motion.p, goal.motion.yaw) == (HIGH.estimate.p_WB, 0.3)
 
 
-def uploaded(total: int, current: int = 0, **changes: object) -> CommandContext:
+def uploaded(total: int, current: int = 0, **changes: object) -> Situation:
     progress = MissionProgress(total=total, current=current)
-    return replace(HIGH, mission=progress, mission_refusal=None, **changes)  # type: ignore[arg-type]
+    return having(HIGH, flight=replace(MISSION, progress=progress), **changes)
 
 
 @pytest.mark.parametrize(
@@ -506,7 +511,7 @@ def test_a_mission_that_starts_on_the_ground_arms_if_arming_is_possible() -> Non
     standing = uploaded(3, mode=Mode.DISARMED, landed=True)
     decision = decided(StartMission(), standing)
     assert (decision.arm, decision.intended_mode, decision.mode) == (True, Mode.MISSION, None)
-    unclear = decided(StartMission(), replace(standing, standing_unclear=True))
+    unclear = decided(StartMission(), having(standing, p_WB=LOW))
     assert (unclear.result, unclear.arm) == (TEMPORARILY_REJECTED, False)
 
 
@@ -526,7 +531,7 @@ def test_the_current_step_is_set_if_there_is_one(
     ("mode", "stops"), [(Mode.MISSION, True), (Mode.HOLD, True), (Mode.OFFBOARD, False)]
 )
 def test_a_mission_is_paused_by_holding(mode: Mode, stops: bool) -> None:
-    decision = decided(Order.PAUSE_MISSION, replace(HIGH, mode=mode))
+    decision = decided(Order.PAUSE_MISSION, having(HIGH, mode=mode))
     assert (decision.result == ACCEPTED) is stops
     assert decision.mode is (Mode.HOLD if mode is Mode.MISSION else None)
     assert decision.stop is (mode is Mode.HOLD)
@@ -534,9 +539,9 @@ def test_a_mission_is_paused_by_holding(mode: Mode, stops: bool) -> None:
 
 def test_arming_checks_are_made_on_the_ground_and_answered_in_words() -> None:
     assert decided(Order.CHECK_ARMING, STANDING).reason == "ready to arm"
-    nearly_empty = replace(STANDING, health=replace(STANDING.health, remaining=0.0))
+    nearly_empty = having(STANDING, battery=BatteryState(remaining=0.0))
     assert "battery" in decided(Order.CHECK_ARMING, nearly_empty).reason
-    ended = decided(Order.CHECK_ARMING, replace(STANDING, mode=Mode.FAULT))
+    ended = decided(Order.CHECK_ARMING, having(STANDING, mode=Mode.FAULT))
     assert ended.result == DENIED
     assert "terminated; restart the flight software" in ended.reason
     assert decided(Order.CHECK_ARMING).result == TEMPORARILY_REJECTED
@@ -544,16 +549,16 @@ def test_arming_checks_are_made_on_the_ground_and_answered_in_words() -> None:
 
 @pytest.mark.parametrize("mode", [Mode.LAND, Mode.MISSION])
 def test_joints_are_moved_in_hold_alone(mode: Mode) -> None:
-    decision = decided(MoveJoints((0.1, 0.1)), replace(HIGH, mode=mode))
+    decision = decided(MoveJoints((0.1, 0.1)), having(HIGH, mode=mode))
     assert (decision.result, decision.joints) == (TEMPORARILY_REJECTED, None)
     assert "hold first" in decision.reason
-    kept = decided(MoveJoints((None, None)), replace(HIGH, joints=(0.2, -0.3)))
+    kept = decided(MoveJoints((None, None)), having(HIGH, q_arm=(0.2, -0.3)))
     assert kept.joints == (0.2, -0.3)
 
 
 def test_home_needs_an_estimate_and_keeps_the_heading() -> None:
-    assert decided(SetHome(None), replace(HIGH, yaw=0.7)).home == Home(HIGH.position, 0.7)
-    lost = decided(SetHome(None), replace(HIGH, estimate_valid=False))
+    assert decided(SetHome(None), having(HIGH, yaw=0.7)).home == Home(HIGH.estimate.p_WB, 0.7)
+    lost = decided(SetHome(None), having(HIGH, invalid_ticks=1))
     assert (lost.result, lost.home) == (TEMPORARILY_REJECTED, None)
 
 
@@ -566,13 +571,13 @@ def test_home_needs_an_estimate_and_keeps_the_heading() -> None:
             "5.0 m above the origin is too high; the maximum is 4 m",
         ),
         ({"fence": SafeSet((wall((-1.0, 0.0, 0.0), -8.0, 0.1),))}, "outside the fence, by 1.10 m"),
-        ({"against_sender": "while armed only 255/190"}, "while armed only 255/190"),
+        ({"sender": (1, 1), "home_owner": (255, 190)}, "while armed only 255/190"),
     ],
 )
 def test_home_is_below_the_ceiling_inside_the_fence_and_its_owners(
     changes: dict[str, object], why: str
 ) -> None:
-    decision = decided(SetHome(Place((9.0, 0.0), 5.0)), replace(HIGH, **changes))  # type: ignore[arg-type]
+    decision = decided(SetHome(Place((9.0, 0.0), 5.0)), having(HIGH, **changes))
     assert (decision.home is None) is bool(why)
     assert why in decision.reason
     assert decision.result == (DENIED if why else ACCEPTED)
@@ -582,7 +587,7 @@ def test_home_is_below_the_ceiling_inside_the_fence_and_its_owners(
 @pytest.mark.requirement("REQ-ARM-9")
 @pytest.mark.parametrize("situation", [STANDING, HIGH])
 def test_a_failure_is_injected_only_where_the_parameter_allows_it(
-    situation: CommandContext,
+    situation: Situation,
 ) -> None:
     refused = ask(situation, 420, 0.0, 1.0, 0.0)
     assert refused.result == DENIED
@@ -623,13 +628,13 @@ def test_no_parameter_of_any_command_may_be_infinite(
 def test_heading_speed_and_flags_of_a_place_are_in_range(
     params: tuple[float, ...], accepted: bool
 ) -> None:
-    decision = ask(replace(HOLDING, position=(0.0, 0.0, -2.0)), 192, *params)
+    decision = ask(having(HOLDING, p_WB=(0.0, 0.0, -2.0)), 192, *params)
     assert (decision.result == ACCEPTED) is accepted, decision
     assert accepted or decision.reason.startswith("no goto: ")
 
 
 def test_a_speed_that_is_not_flown_is_told() -> None:
-    decision = ask(replace(HOLDING, position=(0.0, 0.0, -2.0)), 192, 5.0, 1.0)
+    decision = ask(having(HOLDING, p_WB=(0.0, 0.0, -2.0)), 192, 5.0, 1.0)
     assert decision.result == ACCEPTED
     assert decision.reason == "goto at 1.5 m/s: faster is not flown (STR_V_MAX)"
 

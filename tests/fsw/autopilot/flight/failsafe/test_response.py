@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 from fsw.autopilot.estimation.faults.sensor_fault import SensorFault
 from fsw.autopilot.flight.commander import Commander
 from fsw.autopilot.flight.failsafe.conditions import Action, Condition
-from fsw.autopilot.flight.failsafe.evidence import FailsafeContext
 from fsw.autopilot.flight.failsafe.response import allowed, respond
 from fsw.autopilot.flight.failsafe.table import FAILSAFES, ROWS, Failsafe
+from fsw.autopilot.flight.situation import Situation
 from fsw.autopilot.flight.state import (
     Aiding,
     Damage,
@@ -498,7 +498,7 @@ def test_a_condition_is_told_within_the_time_of_its_row(condition: Condition) ->
 def test_no_row_is_silent_in_flight() -> None:
     """What is not acted upon is told at least: no default is a quiet one."""
     estimate = vehicle_at(HERE, t_us=20 * SECOND)
-    context = FailsafeContext(flying(Mode.MISSION, gcs_heard_us=0), estimate, CONFIG)
+    context = Situation(flying(Mode.MISSION, gcs_heard_us=0), estimate, CONFIG)
     for row in FAILSAFES:
         assert row.action(context) is not Action.NONE, row.condition
 
@@ -545,7 +545,7 @@ def test_what_is_not_delayed_acts_while_something_else_waits(
         now_s = 0.1 * k
         active = tuple(row for row, at_s in zip(rows, begins_s, strict=True) if now_s >= at_s)
         estimate = vehicle_at(HERE, t_us=round(now_s * SECOND))
-        found = respond(FailsafeContext(state, estimate, CONFIG), active)
+        found = respond(Situation(state, estimate, CONFIG), active)
         mode = found.action.mode or state.vehicle.mode
         conditions = tuple(row.condition for row in active)
         vehicle = replace(state.vehicle, failsafe=found.memory, conditions=conditions, mode=mode)

@@ -11,10 +11,11 @@ import pytest
 
 from fsw.autopilot.estimation.faults.sensor_fault import SensorFault
 from fsw.autopilot.flight.failsafe.conditions import Action, Condition
-from fsw.autopilot.flight.failsafe.evidence import FailsafeContext, way_home_s
+from fsw.autopilot.flight.failsafe.evidence import way_home_s
 from fsw.autopilot.flight.failsafe.response import report
 from fsw.autopilot.flight.failsafe.table import FAILSAFES, FAULTS, ROWS, active, quickly_active
 from fsw.autopilot.flight.safety.uncertain_clearance import InflatedSafeSet
+from fsw.autopilot.flight.situation import Situation
 from fsw.autopilot.flight.state import (
     AIDED,
     Aiding,
@@ -78,7 +79,7 @@ class Evidence:
     pressing: dict[str, Any] = field(default_factory=dict)
     held: float = 0.0  # kg, in the gripper
 
-    def context(self) -> FailsafeContext:
+    def context(self) -> Situation:
         last_received_us = NOW_US - self.gcs_silent_us if self.gcs_silent_us >= 0 else -1
         state = replace(
             first_state(self.config.airframe),
@@ -108,9 +109,7 @@ class Evidence:
             ),
         )
         estimate = random_estimate(np.random.default_rng(1))._replace(t_us=NOW_US)
-        return FailsafeContext(
-            state, estimate, replace(self.config, limits=self.limits), heaviest=0.4
-        )
+        return Situation(state, estimate, replace(self.config, limits=self.limits), heaviest=0.4)
 
 
 FINE = Evidence()

@@ -31,7 +31,7 @@ from fsw.autopilot.signals import (
     TickInputs,
     Vec3,
 )
-from tests.fsw.autopilot.flight.contexts import READY
+from tests.fsw.autopilot.flight.contexts import READY, having
 from tests.fsw.autopilot.flight.in_flight import GROUND_Z, flying, limits, vehicle_at
 from tests.fsw.records import changed, with_record
 
@@ -113,7 +113,8 @@ def test_the_reason_of_a_refusal_is_a_text_every_few_seconds_and_the_answer_to_t
     now_us = NOW_US + 50_000 * 199
     state = hearing(problem=memory.problem, problem_us=memory.problem_us)
     problem = current_problem(CONFIG, state, now_us)
-    refusal = OFFBOARD.refusal(replace(READY, setpoint_fresh=False, setpoint_problem=problem))
+    refused = OffboardMemory(problem=problem, problem_us=0)
+    refusal = OFFBOARD.refusal(having(READY, offboard=refused))
     assert refusal == "not offboard: setpoints are refused: forces are not supported"
     dropped = OFFBOARD.waits(state, now_us)
     assert dropped == "offboard cancelled: setpoints were refused: forces are not supported"
@@ -173,12 +174,12 @@ def test_a_setpoint_is_fresh_for_half_a_second(heard: str, age_us: int, fresh: b
 
 def test_it_needs_setpoints() -> None:
     assert OFFBOARD.refusal(READY) is None
-    assert "no setpoint" in (OFFBOARD.refusal(replace(READY, setpoint_fresh=False)) or "")
+    assert "no setpoint" in (OFFBOARD.refusal(having(READY, offboard=OffboardMemory())) or "")
 
 
 def test_a_refusal_says_how_long_it_waits_for_setpoints() -> None:
     patient = Offboard(limits(setpoint_timeout_us=2_500_000))
-    refusal = patient.refusal(replace(READY, setpoint_fresh=False))
+    refusal = patient.refusal(having(READY, offboard=OffboardMemory()))
     assert refusal == "not offboard: no setpoint was received in the last 2.5 s"
 
 
