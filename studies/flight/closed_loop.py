@@ -295,7 +295,7 @@ class ScenarioFlight:
         self.loop = ClosedLoop(simulation, tick, planner, config.airframe)
         # Somebody looks at each tick, or has a part in it; a fault of a sensor may be in each.
         self.may_be_calm = law is None and seen is None and fault is None and not traced
-        self._steps_per_plan = config.mpc_period_us // config.tick_period_us
+        self._steps_per_plan = config.ticks_per_plan
         self._fault, self._faulty = fault, FaultySensors(fault, seed)
         self._traced, self._asked, self._seen = traced, asked, seen
         self._mode, self._stamp_us = Mode.TRAJECTORY, START_US

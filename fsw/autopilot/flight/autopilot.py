@@ -59,7 +59,6 @@ from fsw.autopilot.geometry.rotation import wrap_angle
 from fsw.autopilot.measurements import RangeSample, Sensor
 from fsw.autopilot.model.actuator_health import SOUND
 from fsw.autopilot.model.battery import corrected, drained
-from fsw.autopilot.model.body import body_of
 from fsw.autopilot.model.kinematics import end_effector
 from fsw.autopilot.model.nominal import rest_input
 from fsw.autopilot.model.rotors import is_light
@@ -125,7 +124,6 @@ class Autopilot:
 
     def __init__(self, config: FlightConfig) -> None:
         self.config = config
-        tick = config.tick_period_us * 1e-6
         nothing: EndEffectorTarget | None = None
         self._zones = InflatedSafeSet(), nothing, NO_ZONES
         self._safe_sets = SafeSetCheck(config)
@@ -141,7 +139,7 @@ class Autopilot:
         self._descent = Descent(config)
         limits = config.limits
         reallocates = bool(limits.failed_rotor_mode)
-        self._damage = DamageWatch(config.airframe, tick, reallocates=reallocates)
+        self._damage = DamageWatch(config.airframe, config.tick, reallocates=reallocates)
         self._watches = bool(limits.watches_actuators)
         self.calm = CalmTick(
             *(config, self._fast, self._damage, self._watch, self._sensed, self.zones_now)
@@ -149,12 +147,12 @@ class Autopilot:
         self._accuracy = AccuracyWatch(config, self._safe_sets.loop_tube)
         self._clearance = UncertainClearance(
             limits.clearance_sigmas,
-            body_of(config.planner.body, config.airframe),
+            config.body,
             config.airframe.bodies,
             config.planner.tunings,
             # Half a period until one is asked for, what it takes then, and the loop's own lag.
             0.5 * config.planner.period
-            + config.plan_delay_ticks * tick
+            + config.plan_delay_ticks * config.tick
             + self._cascade.law.filter.lag,
         )
         self._room = ZoneRoom(config)
@@ -162,7 +160,7 @@ class Autopilot:
         self._battery_levels = low, critical, limits.battery_emergency
         self._tick_us = config.tick_period_us
         self._damping = arm_damping(config.airframe)
-        self._ticks_per_plan = config.mpc_period_us // config.tick_period_us
+        self._ticks_per_plan = config.ticks_per_plan
         self._max_us = config.catch_up_ticks * config.tick_period_us
 
     def warm_up(self) -> None:
@@ -179,8 +177,7 @@ class Autopilot:
         self._clearance.warm_up(estimate)
         bodies = self.config.airframe.bodies
         end_effector(bodies, estimate)
-        body = body_of(self.config.planner.body, self.config.airframe)
-        retreat_place(SafeSet(()), estimate, body, bodies, 0.0)
+        retreat_place(SafeSet(()), estimate, self.config.body, bodies, 0.0)
 
     def analyse(self, safe_set: SafeSet) -> tuple[Finding, ...]:
         """Findings on whether this configuration can keep a safe set."""

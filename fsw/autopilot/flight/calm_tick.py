@@ -50,7 +50,7 @@ class CalmTick:
     ) -> None:
         """Of the laws that whole ticks of this configuration have."""
         self._config, self._tick_us = config, config.tick_period_us
-        self._per_plan = config.mpc_period_us // config.tick_period_us
+        self._per_plan = config.ticks_per_plan
         self._fast, self._damage = fast, damage
         self._watch, self._sensed, self._zones_now = watch, sensed, zones_now
         # What was found out about the newest state; another one is looked at anew.

@@ -29,7 +29,6 @@ from fsw.autopilot.flight.setpoints.generator import PositionGoal, SetpointGener
 from fsw.autopilot.flight.setpoints.reference_horizon import ReferenceHorizon
 from fsw.autopilot.flight.situation import Situation
 from fsw.autopilot.flight.state import FlightState, SetpointMemory
-from fsw.autopilot.model.body import body_of
 from fsw.autopilot.parameters.carrying import payload_range
 from fsw.autopilot.parameters.consistency import loop_tube
 from fsw.autopilot.parameters.contradictions import contradictions
@@ -64,7 +63,7 @@ class Commander:
         loop = loop_tube(config)
         self._tube_radius = base_reach(loop, config.surroundings.disturbance)
         self._heaviest = payload_range(config, loop).most
-        self._body = body_of(config.planner.body, config.airframe)
+        self._body = config.body
         self._generator = SetpointGenerator(config)
         self._horizon = ReferenceHorizon(config)
         self._modes: dict[Mode, FlightMode] = {mode: kind(config) for mode, kind in MODES.items()}

@@ -61,7 +61,7 @@ class Descent:
     """The descent of one configuration."""
 
     def __init__(self, config: FlightConfig) -> None:
-        self._model = NominalModel(config.airframe, config.tick_period_us * 1e-6)
+        self._model = NominalModel(config.airframe, config.tick)
         self._brake = Brake(config.airframe, config.planner.limits.tilt)
         self._speed = config.limits.land_speed
         self._legs_z = -config.airframe.leg_length

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from fsw.autopilot.control.cascade import Cascade, KeepClear
 from fsw.autopilot.control.px4_loops import Px4Loops
-from fsw.autopilot.model.body import body_of
 from fsw.autopilot.parameters.flight_config import FlightConfig
 from fsw.frozen import replace
 
 
 def loops_of(config: FlightConfig) -> Cascade:
     """The loops of a configuration."""
-    tick, clear = config.tick_period_us * 1e-6, _keep_clear(config)
+    tick, clear = config.tick, _keep_clear(config)
     if config.inner == "px4":
         return Px4Loops(config.airframe, config.tuning, config.px4, tick, clear)
     return Cascade(config.airframe, config.tuning, config.inner, tick, clear)
@@ -22,9 +21,9 @@ def _keep_clear(config: FlightConfig) -> KeepClear:
 
     Controllers that are flown for comparison are to show what they do without it.
     """
-    enabled = config.safety_filter.enabled and config.controller == "blf" and not config.soft
+    enabled = config.safety_filter.enabled and config.keeps_barriers
     return KeepClear(
-        body_of(config.planner.body, config.airframe),
+        config.body,
         config.planner.tunings,
         replace(config.safety_filter, enabled=int(enabled)),
         config.steering.speed,

@@ -131,7 +131,7 @@ class PlanExchange:
 
     def __init__(self, config: FlightConfig) -> None:
         self._config = config
-        self.model = NominalModel(config.airframe, config.tick_period_us * 1e-6)
+        self.model = NominalModel(config.airframe, config.tick)
         self._brake = Brake(config.airframe, config.planner.limits.tilt)
 
     def follow(
@@ -193,7 +193,7 @@ class PlanExchange:
             u = plan_input(memory.running, nominal, now_us, self._brake)
             return self.model.advance(nominal, u, delay), True
         settled = with_arm_in_bounds(measured, config.airframe, config.planner.limits)
-        return coast(settled, delay * config.tick_period_us * 1e-6), False
+        return coast(settled, delay * config.tick), False
 
 
 def requested(memory: PlanMemory, apply_us: int) -> PlanMemory:

@@ -20,7 +20,6 @@ from fsw.autopilot.control.gains import tracking_gains
 from fsw.autopilot.control.part_tube import LoopOfParts, PartReach, part_reaches, towards
 from fsw.autopilot.control.px4_tube import is_stable, px4_tube
 from fsw.autopilot.control.tube import (
-    EstimateTube,
     Tube,
     all_axes,
     all_axes_up_to,
@@ -31,10 +30,9 @@ from fsw.autopilot.control.tube import (
     tube,
 )
 from fsw.autopilot.model.airframe import GRAVITY, Airframe
-from fsw.autopilot.model.body import body_of
 from fsw.autopilot.model.multibody import posture
 from fsw.autopilot.model.rotors import swing
-from fsw.autopilot.parameters.flight_config import DisturbanceModel, FlightConfig
+from fsw.autopilot.parameters.flight_config import FlightConfig
 from fsw.autopilot.parameters.touching import against_touching
 from fsw.autopilot.shapes import kind_of
 from fsw.autopilot.shapes.ball import is_point
@@ -90,7 +88,7 @@ def analyse(config: FlightConfig, safe_set: SafeSet, loop: Tube) -> tuple[Findin
     the vehicle off that plane. The loop is ``loop_tube(config)``, which takes a moment and
     does not depend on the safe set.
     """
-    surroundings, planner = config.surroundings, config.planner
+    planner = config.planner
     if config.controller != "blf" or not safe_set.zones:
         return ()
     spheres = [zone for zone in safe_set.zones if kind_of(zone.shape).follows_target]
@@ -98,13 +96,13 @@ def analyse(config: FlightConfig, safe_set: SafeSet, loop: Tube) -> tuple[Findin
     findings: list[Finding] = []
     for sphere in spheres:
         radius = sphere.shape.numbers[-1]
-        findings.append(_actuation(config, planner.workspace, surroundings, radius))
-        findings += _rooms_in_sphere(config, loop, radius)
+        findings.append(_actuation(config, planner.workspace, radius))
+        findings.append(_room_in_sphere(planner.workspace, radius))
+        if config.inner == "tracking":
+            findings.append(_wind_in_sphere(planner.workspace, loop, radius))
     if others:
-        findings.append(_actuation(config, planner.walls, surroundings, math.inf))
-        points = [zone.clearance for zone in others if is_point(zone)]
-        if points and planner.body == "points":
-            findings.append(_links(config, min(points)))
+        findings.append(_actuation(config, planner.walls, math.inf))
+        findings += _links(config, others)
     for tuning, zones in ((planner.workspace, spheres), (planner.walls, others)):
         if zones:
             findings += _loop_beside(config, tuning, loop, SafeSet(tuple(zones)))
@@ -116,7 +114,7 @@ def analyse(config: FlightConfig, safe_set: SafeSet, loop: Tube) -> tuple[Findin
         if others:
             findings += _tubes_of_parts(config, loop, others)
             findings += _returns(config, loop)
-        findings.append(_limits(config, loop, surroundings))
+        findings.append(_limits(config, loop))
     return tuple(findings)
 
 
@@ -126,11 +124,8 @@ def _touched(config: FlightConfig, safe_set: SafeSet, loop: Tube) -> list[Findin
     for number, zone in enumerate(safe_set.zones, start=1):
         if zone.touch is not None:
             against = against_touching(config, zone, loop)
-            found.append(
-                Finding(
-                    "touch", -1.0 if against else 0.0, f"zone {number} cannot be touched: {against}"
-                )
-            )
+            why = f"zone {number} cannot be touched: {against}"
+            found.append(Finding("touch", -1.0 if against else 0.0, why))
     return found
 
 
@@ -138,12 +133,12 @@ def _loop_beside(
     config: FlightConfig, tuning: BarrierTuning, loop: Tube, kept: SafeSet
 ) -> list[Finding]:
     """Whether what a plan keeps from zones of one kind is enough for the loop that follows it."""
-    surroundings = config.surroundings
+    disturbance = config.surroundings.disturbance
     if not config.follows_plan:
-        return [_sampled(tuning, surroundings, config.planner.period)]
+        return [_sampled(tuning, disturbance, config.planner.period)]
     if config.inner == "px4" and not is_stable(config.px4):
         return []  # nothing bounds it
-    found = [_base_tube(tuning, loop, surroundings)]
+    found = [_base_tube(tuning, loop, disturbance)]
     if config.inner == "tracking":
         found.append(_tube_of_all_axes(config, tuning, loop, kept))
     return found
@@ -174,12 +169,10 @@ def warnings(findings: tuple[Finding, ...]) -> tuple[str, ...]:
 
 def loop_tube(config: FlightConfig) -> Tube:
     """Tube of the loops that follow the plan, ours or PX4's, per m/s^2 of disturbance."""
-    surroundings = config.surroundings
-    dt = config.tick_period_us * 1e-6
+    pushed = config.surroundings.hanging, config.surroundings.disturbance_hold, config.tick
     if config.inner == "px4":
-        return px4_tube(config.px4, surroundings.hanging, surroundings.disturbance_hold, dt)
-    loop = config.airframe, config.tuning.tracking
-    return tube(*loop, surroundings.hanging, surroundings.disturbance_hold, dt)
+        return px4_tube(config.px4, *pushed)
+    return tube(config.airframe, config.tuning.tracking, *pushed)
 
 
 def estimate_reach(config: FlightConfig, accuracy: Accuracy) -> EstimateReach:
@@ -188,10 +181,9 @@ def estimate_reach(config: FlightConfig, accuracy: Accuracy) -> EstimateReach:
     Errors of position, velocity and tilt are bounded however they change; what the gyro's noise
     does is known by its spectrum.
     """
-    dt = config.tick_period_us * 1e-6
-    moved: EstimateTube = estimate_tube(config.airframe, config.tuning.tracking, dt)
+    moved = estimate_tube(config.airframe, config.tuning.tracking, config.tick)
     sigmas = config.limits.clearance_sigmas or _SIGMAS
-    noise = GRAVITY * config.estimator.gyro_noise / math.sqrt(dt)
+    noise = GRAVITY * config.estimator.gyro_noise / math.sqrt(config.tick)
     loop = (
         (moved.position - 1.0) * accuracy.position
         + moved.velocity * accuracy.velocity
@@ -257,9 +249,8 @@ def sampled_robustness(tuning: BarrierTuning, disturbance: float, period: float)
     return disturbance * (1.0 + 0.5 * tuning.slope * period) / tuning.gamma
 
 
-def _actuation(
-    config: FlightConfig, tuning: BarrierTuning, surroundings: DisturbanceModel, radius: float
-) -> Finding:
+def _actuation(config: FlightConfig, tuning: BarrierTuning, radius: float) -> Finding:
+    surroundings = config.surroundings
     available = GRAVITY * math.tan(config.planner.limits.tilt)
     wanted = tuning.alpha + tuning.gamma * tuning.lambda_ + surroundings.target_acceleration
     parts = "alpha + gamma lambda + |a_t|"
@@ -278,13 +269,6 @@ def _actuation(
         f"braking needs {parts} = {wanted:.2f} m/s^2 and the tilt gives {available:.2f}",
         remedy,
     )
-
-
-def _rooms_in_sphere(config: FlightConfig, loop: Tube, radius: float) -> list[Finding]:
-    found = [_room_in_sphere(config.planner.workspace, radius)]
-    if config.inner == "tracking":
-        found.append(_wind_in_sphere(config.planner.workspace, loop, radius))
-    return found
 
 
 def _room_in_sphere(tuning: BarrierTuning, radius: float) -> Finding:
@@ -311,13 +295,16 @@ def _wind_in_sphere(tuning: BarrierTuning, loop: Tube, radius: float) -> Finding
     )
 
 
-def _links(config: FlightConfig, clearance: float) -> Finding:
+def _links(config: FlightConfig, zones: list[Zone]) -> list[Finding]:
     """Both ends of a link keep off a point; the nearest place of the link is between them."""
+    clearance = min([zone.clearance for zone in zones if is_point(zone)], default=math.inf)
+    if clearance == math.inf or config.planner.body != "points":
+        return []
     bodies = config.airframe.bodies
     links = [bodies.offset[3 * k : 3 * k + 3] for k in range(1, bodies.joints)]
     longest = max(math.hypot(*link) for link in (*links, bodies.tip))
     left = math.sqrt(max(clearance**2 - 0.25 * longest**2, 0.0))
-    return _finding(
+    found = _finding(
         "links",
         left if left > 0.0 else -1.0,
         f"with both ends of a link {clearance * 1e3:.0f} mm from a point, the middle of the "
@@ -325,14 +312,15 @@ def _links(config: FlightConfig, clearance: float) -> Finding:
         f"a clearance above {0.5 * longest * 1e3:.0f} mm is enough",
         refuses=False,
     )
+    return [found]
 
 
-def _base_tube(tuning: BarrierTuning, loop: Tube, surroundings: DisturbanceModel) -> Finding:
-    reach, room = base_reach(loop, surroundings.disturbance), stand_off(tuning)
+def _base_tube(tuning: BarrierTuning, loop: Tube, disturbance: float) -> Finding:
+    reach, room = base_reach(loop, disturbance), stand_off(tuning)
     return _finding(
         "tube",
         room - reach,
-        f"no disturbance within {surroundings.disturbance:g} m/s^2 on one axis pushes the base "
+        f"no disturbance within {disturbance:g} m/s^2 on one axis pushes the base "
         f"further than {reach * 1e3:.0f} mm off its plan, which keeps {room * 1e3:.0f} mm from "
         f"the boundary: margin {(room - reach) * 1e3:+.0f} mm",
         f"lambda >= {reach * tuning.slope:.3f} m/s is enough",
@@ -371,7 +359,7 @@ def return_room(config: FlightConfig, loop: Tube, least: float) -> float:
     What begins is seen, asked about and planned for, and rows of the first nodes hold nothing; then
     h rises as eq 25 has it, and the distance follows h.
     """
-    dt, planner, tuning = config.tick_period_us * 1e-6, config.planner, config.planner.walls
+    dt, planner, tuning = config.tick, config.planner, config.planner.walls
     after = base_after(config.airframe, config.tuning.tracking, dt)
     wind = loop.base_wind - loop.wind_beyond
     begins = _SEEN_S + planner.period + config.plan_delay_ticks * dt
@@ -456,15 +444,14 @@ def _end_effector_tube(config: FlightConfig, loop: Tube) -> Finding:
 
 def part_tube(config: FlightConfig) -> tuple[PartReach, ...]:
     """Reach of the parts of the base with the configured tracking loop."""
-    surroundings, dt = config.surroundings, config.tick_period_us * 1e-6
     loop = LoopOfParts(
         airframe=config.airframe,
         tuning=config.tuning.tracking,
-        disturbance=surroundings.disturbance,
-        hold_s=surroundings.disturbance_hold,
-        dt=dt,
+        disturbance=config.surroundings.disturbance,
+        hold_s=config.surroundings.disturbance_hold,
+        dt=config.tick,
     )
-    return part_reaches(loop, body_of(config.planner.body, config.airframe))
+    return part_reaches(loop, config.body)
 
 
 def _part_tube(config: FlightConfig, zones: list[Zone]) -> Finding:
@@ -500,9 +487,9 @@ def _proof(config: FlightConfig, reach: float) -> str:
     return "no lambda that the tilt can keep would be proof"
 
 
-def _limits(config: FlightConfig, loop: Tube, surroundings: DisturbanceModel) -> Finding:
+def _limits(config: FlightConfig, loop: Tube) -> Finding:
     """The tube is that of the linear loop: it holds while no limit is reached."""
-    disturbance = surroundings.disturbance
+    disturbance = config.surroundings.disturbance
     used = limits_used(config.airframe, config.tuning.tracking, loop, disturbance)
     worst = max(used, key=lambda name: used[name])
     return _finding(
@@ -521,16 +508,15 @@ def _turned(config: FlightConfig) -> Finding:
     Drives rub against the base, and where the centre of mass is elsewhere a push turns it. The
     loop holds a constant angular acceleration a off its plan by g a / k, with its gain k on place.
     """
-    airframe, surroundings = config.airframe, config.surroundings
-    dt = config.tick_period_us * 1e-6
-    stiffness = tracking_gains(config.tuning.tracking, airframe.rotor_lag, dt).k[0]
-    pushed, rubbed = surroundings.disturbance * swing(airframe), _turned_by_friction(airframe)
+    airframe, disturbance = config.airframe, config.surroundings.disturbance
+    stiffness = tracking_gains(config.tuning.tracking, airframe.rotor_lag, config.tick).k[0]
+    pushed, rubbed = disturbance * swing(airframe), _turned_by_friction(airframe)
     off = GRAVITY * (pushed + rubbed) / stiffness
     return _finding(
         "turned",
         _TURNED - off,
         f"friction of its joints turns the base by {rubbed:.1f} rad/s^2, and a push of "
-        f"{surroundings.disturbance:g} m/s^2 by {pushed:.1f}: that holds it {1e3 * off:.0f} mm off "
+        f"{disturbance:g} m/s^2 by {pushed:.1f}: that holds it {1e3 * off:.0f} mm off "
         f"its plan, of {1e3 * _TURNED:.0f} mm",
         "a base of more inertia, joints with less friction, or a lighter arm are enough",
     )
@@ -560,13 +546,13 @@ def _px4_loops(config: FlightConfig, loop: Tube, others: list[Zone]) -> list[Fin
     return [settles, _end_effector_tube(config, loop)] if holds and others else [settles]
 
 
-def _sampled(tuning: BarrierTuning, surroundings: DisturbanceModel, period: float) -> Finding:
-    least = sampled_robustness(tuning, surroundings.disturbance, period)
+def _sampled(tuning: BarrierTuning, disturbance: float, period: float) -> Finding:
+    least = sampled_robustness(tuning, disturbance, period)
     margin = (tuning.lambda_ - least) / tuning.slope
     return _finding(
         "sampled",
         tuning.lambda_ - least,
-        f"rejecting {surroundings.disturbance:g} m/s^2 by planning alone needs lambda >= "
+        f"rejecting {disturbance:g} m/s^2 by planning alone needs lambda >= "
         f"d (1 + k_S T/2) / gamma = {least:.3f} m/s and lambda is {tuning.lambda_:.3f}: margin "
         f"{margin * 1e3:+.0f} mm",
         f"lambda = {least:.3f} m/s is enough",

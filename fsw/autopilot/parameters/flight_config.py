@@ -14,7 +14,7 @@ from fsw.autopilot.control.tube import closest_tracking
 from fsw.autopilot.estimation.tuning import EstimatorTuning
 from fsw.autopilot.geometry.geodesy import DEFAULT_ORIGIN
 from fsw.autopilot.model.airframe import AIRFRAME, Airframe, airframe_of
-from fsw.autopilot.model.body import BODIES, BodyName
+from fsw.autopilot.model.body import BODIES, Body, BodyName, body_of
 from fsw.autopilot.model.multibody import place_of_tip, posture
 from fsw.autopilot.mpc.planner_config import PlannerConfig
 from fsw.autopilot.parameters.control_choice import KNOWN
@@ -165,9 +165,29 @@ class FlightConfig:
         return self.inner != "pid"
 
     @property
+    def keeps_barriers(self) -> bool:
+        """Whether it is promised; others are flown for comparison, to show what they do."""
+        return self.controller == "blf" and not self.soft
+
+    @property
+    def body(self) -> Body:
+        """What keeps clear of zones."""
+        return body_of(self.planner.body, self.airframe)
+
+    @property
+    def tick(self) -> float:
+        """Length of a tick [s]."""
+        return self.tick_period_us * 1e-6
+
+    @property
     def mpc_period_us(self) -> int:
         """Of the planner."""
         return self.planner.period_us
+
+    @property
+    def ticks_per_plan(self) -> int:
+        """Ticks of a planning period."""
+        return self.mpc_period_us // self.tick_period_us
 
 
 def lowest_height(config: FlightConfig) -> float:

@@ -19,7 +19,7 @@ from fsw.autopilot.flight.setpoints.offboard_setpoint import joints_refusal
 from fsw.autopilot.flight.setpoints.orbit_path import max_orbit_speed
 from fsw.autopilot.flight.situation import Situation
 from fsw.autopilot.model.arm_coordinates import arm_coordinates
-from fsw.autopilot.model.body import body_of, hull_reach
+from fsw.autopilot.model.body import hull_reach
 from fsw.autopilot.parameters.flight_config import lowest_height
 from fsw.autopilot.shapes.zones import surface, surfaces
 from fsw.autopilot.signals import (
@@ -464,7 +464,7 @@ def _out_of_bounds(place: Vec3, context: Situation) -> str | None:
 
 
 def _too_close(place: Vec3, context: Situation) -> str | None:
-    body = body_of(context.config.planner.body, context.config.airframe)
+    body = context.config.body
     found = surfaces(context.mission.safe_set, place, context.estimate.t_us)
     for number, at in enumerate(found, start=1):
         if not at.distance > hull_reach(body, at.normal):
@@ -473,7 +473,7 @@ def _too_close(place: Vec3, context: Situation) -> str | None:
 
 
 def _circle_too_close(centre: Vec3, radius: float, context: Situation) -> str | None:
-    body = body_of(context.config.planner.body, context.config.airframe)
+    body = context.config.body
     for number in range(len(context.mission.safe_set.zones)):
 
         def room(angle: float, number: int = number) -> float:

@@ -73,8 +73,7 @@ def on_breach(name: str) -> Callable[[Situation], Action]:
     chosen = by(name)
 
     def action(context: Situation) -> Action:
-        promised = context.config.controller == "blf" and not context.config.soft
-        return chosen(context) if promised else Action.WARN
+        return chosen(context) if context.config.keeps_barriers else Action.WARN
 
     return action
 

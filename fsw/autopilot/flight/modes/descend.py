@@ -8,7 +8,6 @@ from fsw.autopilot.flight.modes.base import FlightMode, ModeResult, Px4Mode, tou
 from fsw.autopilot.flight.safety.retreat import retreat_place
 from fsw.autopilot.flight.setpoints.generator import PositionGoal
 from fsw.autopilot.flight.state import FlightState, SetpointMemory
-from fsw.autopilot.model.body import body_of
 from fsw.autopilot.parameters.flight_config import FlightConfig
 from fsw.autopilot.signals import Mode, MotionSetpoint, StateEstimate
 from fsw.frozen import replace
@@ -22,7 +21,7 @@ class Descend(FlightMode):
 
     def __init__(self, config: FlightConfig) -> None:
         super().__init__(config)
-        self._body = body_of(config.planner.body, config.airframe)
+        self._body = config.body
         self._bodies = config.airframe.bodies
         self._room = stand_off(config.planner.walls)
 

@@ -30,7 +30,6 @@ from fsw.autopilot.flight.safety.safety_watch import least
 from fsw.autopilot.flight.safety.uncertain_clearance import InflatedSafeSet
 from fsw.autopilot.flight.state import MissionMemory
 from fsw.autopilot.geometry.vectors import norm
-from fsw.autopilot.model.body import body_of
 from fsw.autopilot.mpc.reference import still_at
 from fsw.autopilot.parameters.consistency import (
     Finding,
@@ -84,9 +83,8 @@ class SafeSetCheck:
         self._config = config
         self.loop_tube = loop_tube(config)
         part_tube(config)  # takes a moment, and is then known
-        planner, airframe = config.planner, config.airframe
-        body = body_of(planner.body, airframe)
-        self._margins = Margins(body, airframe.bodies, planner.tunings, planner.period)
+        planner, bodies = config.planner, config.airframe.bodies
+        self._margins = Margins(config.body, bodies, planner.tunings, planner.period)
 
     def analyse(self, safe_set: SafeSet) -> tuple[Finding, ...]:
         """Findings on whether this configuration can keep a safe set."""

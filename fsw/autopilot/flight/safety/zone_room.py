@@ -51,8 +51,7 @@ class ZoneRoom:
         self._walls, self._workspace = config.planner.tunings
         self._speed = config.steering.speed
         self._lowest, self._legs = lowest_height(config), config.airframe.leg_length
-        # The others are flown for comparison, to show what they do.
-        self._limits = config.controller == "blf" and not config.soft
+        self._limits = config.keeps_barriers
 
     def limit(
         self,

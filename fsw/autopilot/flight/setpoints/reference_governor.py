@@ -26,7 +26,7 @@ from functools import cache, lru_cache
 from fsw.autopilot.barriers.safe_approach import BarrierTuning, safe_approach_speed
 from fsw.autopilot.flight.setpoints.offboard_setpoint import finite_or_zero
 from fsw.autopilot.geometry.vectors import add_scaled, dot, limit_norm, norm, subtract
-from fsw.autopilot.model.body import Body, body_of, hull_reach
+from fsw.autopilot.model.body import Body, hull_reach
 from fsw.autopilot.parameters.flight_config import FlightConfig, lowest_height
 from fsw.autopilot.shapes.kind import Surface
 from fsw.autopilot.shapes.zones import NO_ZONES, Array, moving_zones, nearest_plane, surface
@@ -225,7 +225,7 @@ class ReferenceGovernor:
     def __init__(self, config: FlightConfig) -> None:
         self._config = config
         self._barrier = config.planner.walls
-        self._body = body_of(config.planner.body, config.airframe)
+        self._body = config.body
         # The arm hangs: the end-effector is that much lower than the base.
         lowest, highest = lowest_height(config), config.steering.highest
         self._hanging = hanging = config.surroundings.hanging
