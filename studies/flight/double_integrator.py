@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from fsw.autopilot.control.braking import Brake
-from fsw.autopilot.flight.plan_exchange import plan_input
+from fsw.autopilot.flight.plan_exchange import planned_input
 from fsw.autopilot.geometry.vectors import add, subtract, three
 from fsw.autopilot.model.kinematics import level_frame, position
 from fsw.autopilot.model.multibody import Bodies, bodies_of
@@ -168,7 +168,7 @@ def simulate(
         recorder.planned(answer)
         running = answer if isinstance(answer, Plan) else running
         # As in flight: without an answer the running plan goes on, then the vehicle brakes.
-        u = plan_input(running, start, t_us, brake)
+        u = planned_input(running, t_us) or brake(start)
         recorder.metrics.add(u)
         for _ in range(steps):
             if traced and plant.step % TRACE_STEPS == 0:

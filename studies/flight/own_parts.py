@@ -30,7 +30,7 @@ from scipy.spatial.transform import Rotation
 
 from fsw.autopilot.control.safety_gate import gate, stopped
 from fsw.autopilot.flight.autopilot import Autopilot
-from fsw.autopilot.flight.loops import loops_of
+from fsw.autopilot.flight.fast_loop import loops_of
 from fsw.autopilot.flight.state import FlightState
 from fsw.autopilot.measurements import Sample
 from fsw.autopilot.model.airframe import GRAVITY

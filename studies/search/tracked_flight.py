@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from fsw.autopilot.control.cascade import CascadeLaw, close_loops
 from fsw.autopilot.control.safety_filter import FilterProbes
 from fsw.autopilot.estimation.estimator import READINGS, read_into
-from fsw.autopilot.flight.loops import loops_of
+from fsw.autopilot.flight.fast_loop import loops_of
 from fsw.autopilot.model.prediction import Array
 from fsw.autopilot.parameters.flight_config import FlightConfig
 from fsw.autopilot.tick_record import FILTER_ACTED, Tick

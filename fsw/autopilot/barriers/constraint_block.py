@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fsw.autopilot.model.linearisation import Linearisation
 from fsw.autopilot.model.prediction import Array
-from fsw.autopilot.signals import SafeSet
 
 
 class Rows(NamedTuple):
@@ -83,20 +81,3 @@ class TargetPoints:
         for name in ("position", "velocity", "yaw"):  # kernels rely on the layout
             array = np.ascontiguousarray(getattr(self, name), dtype=np.float64)
             object.__setattr__(self, name, array)
-
-
-class Barrier(Protocol):
-    """A safe set that keeps the horizon inside by soft rows."""
-
-    @property
-    def rows(self) -> ConstraintBlock:
-        """The rows as of the last refill."""
-        ...
-
-    def update(self, safe_set: SafeSet) -> None:
-        """Take other numbers of the same zones: they moved, or their clearance changed."""
-        ...
-
-    def refill(self, horizon: Linearisation, targets: TargetPoints) -> None:
-        """Bring the rows up to date with a linearisation."""
-        ...

@@ -154,7 +154,7 @@ class ZoneRows:
         self._rows, self._fill = self.rows.rows, machine_code(_fill)
 
     def update(self, safe_set: SafeSet) -> None:
-        """See ``fsw.autopilot.barriers.constraint_block.Barrier``."""
+        """Take other numbers of the same zones: they moved, or their clearance changed."""
         self._zones, self._moving = zone_arrays(safe_set), all_moving_zones(safe_set)
         self._targets: TargetPoints | None = None
 

@@ -20,15 +20,14 @@ from fsw.autopilot.estimation.estimator import estimate_state
 from fsw.autopilot.estimation.fusion_memory import FusionMemory
 from fsw.autopilot.flight.calm_tick import CalmTick
 from fsw.autopilot.flight.commander import Commander
-from fsw.autopilot.flight.descent import Descent, forget_wind
 from fsw.autopilot.flight.estimate.before_estimate import nothing_known, nowhere, told
 from fsw.autopilot.flight.estimate.exact_state import ExactState
 from fsw.autopilot.flight.estimate.jump import all_along
-from fsw.autopilot.flight.estimate.missed_ticks import loops_resumed, plan_resumed
+from fsw.autopilot.flight.estimate.missed_ticks import resumed
 from fsw.autopilot.flight.estimate.sensed_state import CaughtUp, SensedState
-from fsw.autopilot.flight.fast_loop import FastLoop
+from fsw.autopilot.flight.fast_loop import FastLoop, loops_of
 from fsw.autopilot.flight.land_detector import with_range
-from fsw.autopilot.flight.loops import loops_of
+from fsw.autopilot.flight.modes.descend import Descent, forget_wind
 from fsw.autopilot.flight.modes.mission import with_update
 from fsw.autopilot.flight.modes.offboard import accept_setpoints
 from fsw.autopilot.flight.plan_exchange import (
@@ -50,8 +49,7 @@ from fsw.autopilot.flight.safety.uncertain_clearance import (
     pose_covariance,
 )
 from fsw.autopilot.flight.safety.zone_room import ZoneRoom
-from fsw.autopilot.flight.setpoints.pressed_reference import pressed_reference
-from fsw.autopilot.flight.setpoints.reference_horizon import ReferenceHorizon
+from fsw.autopilot.flight.setpoints.reference_horizon import ReferenceHorizon, pressed_reference
 from fsw.autopilot.flight.setpoints.target_check import TargetCheck
 from fsw.autopilot.flight.snapshot import Shown
 from fsw.autopilot.flight.state import AIDED, Damage, FlightState, PlanMemory, SafetyMemory
@@ -219,7 +217,8 @@ class Autopilot:
         flown = vehicle.flies and vehicle.unloaded is None and bool(state.record.has_plan)
         if flown and now_us - state.t_us > self._max_us:  # on to the next that asks for a plan
             ticks, looped = self._ticks_per_plan - state.index % self._ticks_per_plan, 1
-            state = self._resumed(state, estimate)
+            motion = self._cascade.motion(state.record, estimate)
+            state = resumed(self.config, state, estimate, motion)
         if state.record is not began:  # loops or plan begin anew
             r = state.record.copy()
             r.state_estimate = estimate
@@ -473,12 +472,6 @@ class Autopilot:
     def _jumped(self, state: FlightState, now_us: int) -> bool:
         """Whether time did: on by more than is made up for, or not on at all."""
         return state.index >= 0 and not 0 < now_us - state.t_us <= self._max_us
-
-    def _resumed(self, state: FlightState, estimate: StateEstimate) -> FlightState:
-        """The state after a time without ticks: loops and plan go on from the measurement."""
-        motion = self._cascade.motion(state.record, estimate)
-        state = plan_resumed(self.config, state, estimate, motion)
-        return replace(state, record=loops_resumed(self.config, state.record, estimate))
 
     def _elapsed_ticks(self, state: FlightState, now_us: int) -> int:
         """Ticks since the last one: more than one where sensor frames were missed."""

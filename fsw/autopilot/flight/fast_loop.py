@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 
 from fsw.autopilot.control.cascade import (
     Cascade,
+    KeepClear,
     close_loops,
     compare_with_plan,
     note_weight,
@@ -42,13 +43,37 @@ from fsw.autopilot.estimation.sensor_fusion import FilterCall
 from fsw.autopilot.estimation.tuning import EstimatorTuning
 from fsw.autopilot.model.actuator_health import HEALTHY, ActuatorHealth, note_health
 from fsw.autopilot.model.nominal import NominalModel, move_plan
+from fsw.autopilot.parameters.flight_config import FlightConfig
 from fsw.autopilot.shapes.zones import NO_ZONES, Zones
 from fsw.autopilot.tick_record import IMPAIRED, Expected, Tick
 from fsw.compiled import kernel, machine_code, packed
+from fsw.frozen import replace
 from fsw.record import Floats
 
 EXPECT, EXPLAINS, JUDGED, FRAME, CALM, LOOPS = 1, 2, 4, 8, 16, 32
 BELIEVED: Final = 8  # beside what came of the filter's parts: all stages were done
+
+
+def loops_of(config: FlightConfig) -> Cascade:
+    """The loops of a configuration: our own, or what asks PX4's."""
+    tick, clear = config.tick, _keep_clear(config)
+    if config.inner == "px4":
+        return Px4Loops(config.airframe, config.tuning, config.px4, tick, clear)
+    return Cascade(config.airframe, config.tuning, config.inner, tick, clear)
+
+
+def _keep_clear(config: FlightConfig) -> KeepClear:
+    """What the safety filter keeps off zones; it works where the planner has barriers to rely on.
+
+    Controllers that are flown for comparison are to show what they do without it.
+    """
+    enabled = config.safety_filter.enabled and config.keeps_barriers
+    return KeepClear(
+        config.body,
+        config.planner.tunings,
+        replace(config.safety_filter, enabled=int(enabled)),
+        config.steering.speed,
+    )
 
 
 @kernel

@@ -14,8 +14,8 @@ Then rotors stop as soon as the legs are close above the ground, and the vehicle
 its legs stand.
 
 Where neither the height nor the force is measured no ground is noticed, and nothing that falls. A
-descent is faster from where the ground should be (``descent.py``); rotors stop 1 m below that, or
-there, without a gyro.
+descent is faster from where the ground should be (``modes/descend.py``); rotors stop 1 m below
+that, or there, without a gyro.
 
 In every mode a vehicle whose rotors carry less than the weight for a second stands, whatever it
 believes of its height: the failsafe table lands it (``evidence.stands_on_ground``).

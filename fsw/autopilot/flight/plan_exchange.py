@@ -88,11 +88,6 @@ def planned_input(plan: Plan | None, now_us: int) -> PlanInput | None:
     return plan.inputs[step] if young else None
 
 
-def plan_input(plan: Plan | None, nominal: PredictionState, now_us: int, brake: Brake) -> PlanInput:
-    """The running plan's input at its age; braking where there is none young enough."""
-    return planned_input(plan, now_us) or brake(nominal)
-
-
 def take_answer(
     memory: PlanMemory, answer: Plan | PlanFailure | None, now_us: int
 ) -> tuple[PlanMemory, Plan | None]:
@@ -160,7 +155,7 @@ class PlanExchange:
         return memory
 
     def _steer(self, plan: Plan | None, r: Tick, now_us: int) -> None:
-        """The running plan's input, as ``plan_input`` has it."""
+        """Write the running plan's input, or braking where there is none young enough."""
         if (u := planned_input(plan, now_us)) is None:
             nominal = r.plan_state
             assert nominal is not None
@@ -190,7 +185,7 @@ class PlanExchange:
             and abs(wrap_angle(nominal.yaw - measured.yaw)) < config.upset_yaw
         )
         if from_nominal:
-            u = plan_input(memory.running, nominal, now_us, self._brake)
+            u = planned_input(memory.running, now_us) or self._brake(nominal)
             return self.model.advance(nominal, u, delay), True
         settled = with_arm_in_bounds(measured, config.airframe, config.planner.limits)
         return coast(settled, delay * config.tick), False

@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from fsw.autopilot.barriers.constraint_block import Barrier
 from fsw.autopilot.barriers.zone_rows import ZoneRows
 from fsw.autopilot.model.body import body_of
 from fsw.autopilot.model.prediction import CondensedModel
@@ -24,7 +23,7 @@ class OcpTerms:
     """What shapes the optimum of one controller in one safe set."""
 
     costs: tuple[Cost, ...]
-    barriers: tuple[Barrier, ...] = ()
+    barriers: tuple[ZoneRows, ...] = ()
     slack: float | None = None  # penalty of softening their rows; None: they are hard
     follows_zones: bool = True  # False: costs hold the numbers of zones, and are made anew
 

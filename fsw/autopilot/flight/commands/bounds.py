@@ -20,6 +20,7 @@ from fsw.autopilot.signals import (
     MissionUpdate,
     MotionSetpoint,
     SafeSet,
+    Touch,
     Vec3,
     Zone,
 )
@@ -90,20 +91,16 @@ def zone_problem(zone: Zone, max_speed: float = math.inf) -> str | None:
     if not _within(speed, min(max_speed, MAX_SPEED)):
         most = min(max_speed, MAX_SPEED)
         return f"it moves at {speed:g} m/s; at most {most:g} m/s is expected (SUR_V_ZONE)"
-    if zone.touch is not None:
-        problem = touch_problem(zone)
-        if problem is not None:
-            return problem
+    against = None if zone.touch is None else touch_problem(zone, zone.touch)
+    if against is not None:
+        return against
     if kind.follows_target and (not zone.keep_in or zone.velocity != _AT_REST):
         return "what follows the target is to be kept in, and has no velocity of its own"
     return None
 
 
-def touch_problem(zone: Zone) -> str | None:
+def touch_problem(zone: Zone, touch: Touch) -> str | None:
     """Why what is said of a surface that may be touched is out of range."""
-    touch = zone.touch
-    if touch is None:
-        return None
     if zone.keep_in:
         return "what is to be kept in cannot be touched"
     low, high = touch.stiffness_low, touch.stiffness_high
@@ -129,15 +126,7 @@ def reference_problem(target: EndEffectorTarget) -> str | None:
     """Why a target is out of range; none of its axes may be open."""
     if not 0.0 <= target.force <= MAX_FORCE:
         return f"a force of {target.force:g} N is outside 0 to {MAX_FORCE:g} N"
-    return point_problem(target.p_WE, target.v_WE, target.a_WE, target.yaw)
-
-
-def point_problem(p: Vec3, v: Vec3, a: Vec3, yaw: float) -> str | None:
-    """Why a point of a trajectory is out of range; none of its axes may be open.
-
-    It has a place ``p`` [m, NED], a velocity ``v`` [m/s, NED], an acceleration ``a`` [m/s^2, NED]
-    and a heading ``yaw`` [rad].
-    """
+    p, v, a, yaw = target.p_WE, target.v_WE, target.a_WE, target.yaw
     if not all(map(math.isfinite, (*p, *v, *a, yaw))):
         return "a number is not finite"
     return motion_refusal(MotionSetpoint(True, p, v, a, yaw))

@@ -14,9 +14,8 @@ from fsw.autopilot.flight.failsafe.table import BLOCKING
 from fsw.autopilot.flight.modes.base import FlightMode
 from fsw.autopilot.flight.restart import RESTARTED, rests
 from fsw.autopilot.flight.safety import way_home
-from fsw.autopilot.flight.setpoints.generator import PositionGoal
+from fsw.autopilot.flight.setpoints.generator import PositionGoal, max_orbit_speed
 from fsw.autopilot.flight.setpoints.offboard_setpoint import joints_refusal
-from fsw.autopilot.flight.setpoints.orbit_path import max_orbit_speed
 from fsw.autopilot.flight.situation import Situation
 from fsw.autopilot.model.arm_coordinates import arm_coordinates
 from fsw.autopilot.model.body import hull_reach

@@ -12,7 +12,7 @@ from fsw.autopilot.estimation.dead_reckoning import moved_on
 from fsw.autopilot.estimation.estimator import read_frame
 from fsw.autopilot.estimation.faults.sensor_fault import SensorFault
 from fsw.autopilot.estimation.frame_dropout import Dropout, filled
-from fsw.autopilot.flight.estimate.jump import returned
+from fsw.autopilot.flight.estimate.jump import all_along, on_return
 from fsw.autopilot.flight.fast_loop import FastLoop
 from fsw.autopilot.flight.state import AIDED, COMPLETE, Aiding, FlightState, LostSensor
 from fsw.autopilot.measurements import Sensor
@@ -85,7 +85,10 @@ class ExactState:
             )
             aiding = _aiding(dropout, found.t_us)
         if away and dropout.pose.since_us < 0:
-            state = returned(state, found, before, texts)
+            reset, said = on_return(found, before)
+            texts += said
+            record, state, plan = all_along(state.record, state, state.plan, reset)
+            state = replace(state, record=record, plan=plan)
         return replace(state, dropout=dropout, aiding=aiding), found
 
 

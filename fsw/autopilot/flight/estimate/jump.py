@@ -62,12 +62,12 @@ def held_along(state: FlightState, reset: Reset) -> FlightState:
 
 def without_answer(plan: PlanMemory, reset: Reset) -> PlanMemory:
     """The memory of a planner whose next answer would lead back to where the vehicle was."""
-    if plan.awaited_id < 0 or not is_far(reset):
+    if plan.awaited_id < 0 or not _is_far(reset):
         return plan
     return replace(plan, awaited_id=-1, awaited_missed=False)
 
 
-def is_far(reset: Reset) -> bool:
+def _is_far(reset: Reset) -> bool:
     """Whether the estimate jumped so far that the operator reads about it."""
     return max(map(abs, reset.position)) > _TOLD
 
@@ -97,17 +97,4 @@ def on_return(found: StateEstimate, before: StateEstimate) -> tuple[Reset, list[
     moved = add_scaled(found.p_WB, expected.p_WB, -1.0)
     faster = add_scaled(found.v_WB, expected.v_WB, -1.0)
     reset = Reset(1, moved, faster, multiply(q, conjugate(carried)))
-    return reset, [StatusText(Severity.WARNING, told(reset))] if is_far(reset) else []
-
-
-def returned(
-    state: FlightState, found: StateEstimate, before: StateEstimate, texts: list[StatusText]
-) -> FlightState:
-    """The state when positions are there again; appends to ``texts``.
-
-    The plan moves along with what was found instead of what had been carried on from ``before``.
-    """
-    reset, said = on_return(found, before)
-    texts += said
-    plan = without_answer(state.plan, reset)
-    return replace(state, record=moved_along(state.record, reset), plan=plan)
+    return reset, [StatusText(Severity.WARNING, told(reset))] if _is_far(reset) else []

@@ -23,7 +23,6 @@ from fsw.autopilot.flight.state import FlightState
 from fsw.autopilot.model.rotors import MotionState
 from fsw.autopilot.parameters.flight_config import FlightConfig
 from fsw.autopilot.signals import StateEstimate, TickInputs
-from fsw.autopilot.tick_record import Tick
 from fsw.frozen import replace
 
 # Since the last tick. The filter takes what is so old at once, and nothing that is older.
@@ -47,24 +46,19 @@ def missed_inputs(last_us: int, inputs: TickInputs) -> Iterator[TickInputs]:
     yield inputs
 
 
-def loops_resumed(config: FlightConfig, before: Tick, estimate: StateEstimate) -> Tick:
-    """The record from which loops go on: what they have learned, but no motion.
-
-    Of the disturbance its lasting part is kept, wind.
-    """
-    after = before.copy()
-    observed = after.observed
-    observed.v[:] = estimate.v_WB
-    observed.d[:2], observed.d[2] = observed.disturbance_bias, 0.0
-    rest_joints(after.joints, config.airframe, estimate)
-    return after
-
-
-def plan_resumed(
+def resumed(
     config: FlightConfig, state: FlightState, estimate: StateEstimate, motion: MotionState
 ) -> FlightState:
-    """The state without a plan, to brake from the measured motion until there is one."""
+    """The state without a plan, to brake from the measured motion until there is one.
+
+    Loops go on from what they have learned, but from no motion; of the disturbance its lasting part
+    is kept, wind.
+    """
     measured = measured_state(estimate, motion)
     settled = with_arm_in_bounds(measured, config.airframe, config.planner.limits)
     state = without_plan(state, estimate)
-    return replace(state, record=with_plan_state(state.record, settled))
+    r = with_plan_state(state.record, settled)
+    r.observed.v[:] = estimate.v_WB
+    r.observed.d[:2], r.observed.d[2] = r.observed.disturbance_bias, 0.0
+    rest_joints(r.joints, config.airframe, estimate)
+    return replace(state, record=r)

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from enum import Enum
 from functools import partial
 from typing import Final
 
@@ -31,13 +30,6 @@ SLOW_US: Final = PLANNING_US  # after which the other rows are looked at again
 _OF_HOST_US: Final = 1_000_000 + SLOW_US  # the loop looks at its machine once a second
 
 
-class UserTakeoverAllowed(Enum):
-    """Whether the pilot can fly another mode while a condition acts, in PX4's words."""
-
-    ALWAYS = "always"
-    NEVER = "never"  # nothing but Descend can be flown
-
-
 @dataclass(frozen=True, slots=True)
 class Failsafe:
     """One row of the table."""
@@ -54,7 +46,7 @@ class Failsafe:
     within_us: int = AT_ONCE_US  # until it is reported, beyond the time of a parameter
     parameters: tuple[str, ...] = ()  # that belong to it
     component: Subject | None = None  # which is reported as unhealthy while it lasts
-    takeover: UserTakeoverAllowed = UserTakeoverAllowed.ALWAYS
+    takeover: bool = True  # the pilot can fly another mode while it acts; else Descend alone
 
     def action(self, context: Situation) -> Action:
         """What is done now, if it is active."""
@@ -124,7 +116,7 @@ FAILSAFES: Final = (
         wording.uncertain,
         parameters=("COM_AID_LOSS_T", "COM_POS_FS_EPH"),
         component=Subject.ESTIMATOR,
-        takeover=UserTakeoverAllowed.NEVER,
+        takeover=False,
     ),
     _in_flight(
         Condition.PLANNER_LOST,
@@ -134,7 +126,7 @@ FAILSAFES: Final = (
         wording.no_plan,
         slow=True,
         parameters=("COM_PLN_LOSS_T",),
-        takeover=UserTakeoverAllowed.NEVER,
+        takeover=False,
     ),
     _fault(
         Condition.BREACH,
@@ -433,9 +425,7 @@ FAILSAFES: Final = (
 ROWS: Final = {row.condition: row for row in FAILSAFES}
 FAULTS: Final = frozenset(row.condition for row in FAILSAFES if row.of_vehicle)
 _QUICK: Final = tuple([row for row in FAILSAFES if not row.slow])
-BLOCKING: Final = frozenset(
-    row.condition for row in FAILSAFES if row.takeover is UserTakeoverAllowed.NEVER
-)
+BLOCKING: Final = frozenset(row.condition for row in FAILSAFES if not row.takeover)
 
 
 def unhealthy(conditions: tuple[Condition, ...]) -> tuple[str, ...]:

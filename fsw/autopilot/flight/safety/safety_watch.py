@@ -87,28 +87,18 @@ class SafetyWatch:
         if nominal is None:
             return memory if memory.off_plan_us < 0 else replace(memory, off_plan_us=-1)
         (x, y, z), (px, py, pz) = estimate.p_WB, nominal.p
-        dx, dy, dz = x - px, y - py, z - pz
         most = self.radius + wind + beyond_room(unsure)
-        if (
-            memory.off_plan_us < 0
-            and -most <= dx <= most
-            and -most <= dy <= most
-            and (-most <= dz <= most or self._is_low(estimate))
-        ):
-            return memory
-        away = max(abs(dx), abs(dy), 0.0 if self._is_low(estimate) else abs(dz))
-        now_us = estimate.t_us
-        if not away <= most:
-            if memory.off_plan_us >= 0:
-                return replace(memory, off_plan_us=now_us, replan=True)
+        down = 0.0 if self._is_low(estimate) else abs(z - pz)
+        away = abs(x - px), abs(y - py), down
+        off, near = not all(one <= most for one in away), max(away) > self._back
+        before_us = memory.off_plan_us
+        last_us = _lasts(before_us, estimate.t_us, active=off, near=near, ends_us=_BACK_US)
+        if not off:
+            return memory if last_us == before_us else replace(memory, off_plan_us=last_us)
+        if before_us < 0:
             counters = replace(memory.counters, departures=memory.counters.departures + 1)
-            return replace(
-                memory, off_plan_us=now_us, off_plan_by=away, replan=True, counters=counters
-            )
-        if away > self._back:
-            return replace(memory, off_plan_us=now_us)
-        ended = now_us - memory.off_plan_us >= _BACK_US
-        return replace(memory, off_plan_us=-1) if ended else memory
+            memory = replace(memory, off_plan_by=max(away), counters=counters)
+        return replace(memory, off_plan_us=last_us, replan=True)
 
     def breach(
         self,
@@ -153,14 +143,11 @@ class SafetyWatch:
 
     def filtered(self, memory: SafetyMemory, now_us: int, *, pushed: bool) -> SafetyMemory:
         """Note whether the safety filter changed the acceleration of this tick."""
-        if pushed:
-            if memory.filter_us >= 0:
-                return replace(memory, filter_us=now_us)
+        if pushed and memory.filter_us < 0:
             counters = replace(memory.counters, interventions=memory.counters.interventions + 1)
-            return replace(memory, filter_us=now_us, counters=counters)
-        if memory.filter_us < 0 or now_us - memory.filter_us < _FILTER_US:
-            return memory
-        return replace(memory, filter_us=-1)
+            memory = replace(memory, counters=counters)
+        last_us = _lasts(memory.filter_us, now_us, active=pushed, near=False, ends_us=_FILTER_US)
+        return memory if last_us == memory.filter_us else replace(memory, filter_us=last_us)
 
     def _is_low(self, estimate: StateEstimate) -> bool:
         """On the ground, where the plan may well be lower than the vehicle can be."""
@@ -190,11 +177,20 @@ def least(margins: tuple[float, ...]) -> float:
 
 def _outside(last_us: int, by: float, now_us: int, least: float) -> tuple[int, float]:
     """When a margin was negative or small last, -1: it is over; and by how much [m] at first."""
-    if not least >= 0.0:
-        return now_us, by if last_us >= 0 else -least
-    if last_us < 0 or least < _CLEAR:
-        return (now_us if last_us >= 0 else -1), by
-    return (-1 if now_us - last_us >= _CLEAR_US else last_us), by
+    negative, small = not least >= 0.0, least < _CLEAR
+    if negative and last_us < 0:
+        by = -least
+    return _lasts(last_us, now_us, active=negative, near=small, ends_us=_CLEAR_US), by
+
+
+def _lasts(last_us: int, now_us: int, *, active: bool, near: bool, ends_us: int) -> int:
+    """When an episode that is ``active`` now, or was at ``last_us``, was so last; -1: it is over.
+
+    It goes on while it is ``near`` to being active, and ends when that was ``ends_us`` [us] ago.
+    """
+    if active or (near and last_us >= 0):
+        return now_us
+    return last_us if now_us - last_us < ends_us else -1
 
 
 def _since(since_us: int, now_us: int, *, active: bool) -> int:

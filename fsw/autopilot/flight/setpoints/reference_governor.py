@@ -260,42 +260,19 @@ class ReferenceGovernor:
         )
 
     def limit_horizon(
-        self, targets: tuple[EndEffectorTarget, ...], p_WE: Vec3, v_WE: Vec3, safe_set: SafeSet
-    ) -> tuple[EndEffectorTarget, ...]:
-        """The targets of a horizon, the same object where nothing had to be limited.
+        self,
+        targets: tuple[EndEffectorTarget, ...],
+        p_WE: Vec3,
+        v_WE: Vec3,
+        safe_set: SafeSet,
+        limits: Limits = UNLIMITED,
+    ) -> tuple[tuple[EndEffectorTarget, ...], str]:
+        """The targets of a horizon, the same object where nothing had to be limited, and why.
 
         What is asked for near the motion of the end-effector, ``p_WE`` [m, NED] and ``v_WE``
         [m/s, NED], and not far behind a wall passes as it is: the paper's own path enters the
-        safety zone.
+        safety zone. Targets from outside have ``limits`` [m, m, m/s] of height and speed as well.
         """
-        return self._limited(targets, p_WE, v_WE, safe_set, UNLIMITED)[0]
-
-    def limit_external(
-        self,
-        targets: tuple[EndEffectorTarget, ...],
-        p_WE: Vec3,
-        v_WE: Vec3,
-        safe_set: SafeSet,
-        lowest: float = -math.inf,
-    ) -> tuple[tuple[EndEffectorTarget, ...], str]:
-        """The same of targets from outside, limited in height and speed, and why they were.
-
-        The end-effector is at ``p_WE`` [m, NED] and moves at ``v_WE`` [m/s, NED]; ``lowest``
-        [m, NED] is where it came up from, if it is on its way from below the lowest height.
-        """
-        limits = self._limits_from(lowest)
-        limited, left = self._limited(targets, p_WE, v_WE, safe_set, limits)
-        return limited, self.reason(left, limits)
-
-    def _limited(
-        self,
-        targets: tuple[EndEffectorTarget, ...],
-        p_WE: Vec3,
-        v_WE: Vec3,
-        safe_set: SafeSet,
-        limits: Limits,
-    ) -> tuple[tuple[EndEffectorTarget, ...], int]:
-        """The targets within limits of height and speed too, and which of these they have left."""
         zones, begin_us, limited, left = _moving_zones(safe_set), targets[0].t_us, [], 0
         alpha, slope = self._barrier.alpha, self._barrier.slope
         for one in targets:
@@ -304,7 +281,7 @@ class ReferenceGovernor:
             limited.append(EndEffectorTarget(one.t_us, p, v, one.a_WE, one.yaw, one.force))
             left |= which
         result = tuple(limited)
-        return targets if result == targets else result, left
+        return targets if result == targets else result, self._reason(left, limits)
 
     def limit_now(
         self,
@@ -312,27 +289,30 @@ class ReferenceGovernor:
         p_WE: Vec3,
         v_WE: Vec3,
         safe_set: SafeSet,
-        lowest: float = -math.inf,
+        limits: Limits,
     ) -> EndEffectorTarget:
         """The target from outside of this instant.
 
-        ``p_WE`` [m, NED], ``v_WE`` [m/s, NED] and ``lowest`` [m, NED] as in ``limit_external``.
+        ``p_WE`` [m, NED], ``v_WE`` [m/s, NED], ``limits`` [m, m, m/s] as in ``limit_horizon``.
         """
-        floor, highest, fastest = self._limits_from(lowest)
+        lowest, highest, fastest = limits
         if (
-            highest <= target.p_WE[2] <= floor
+            highest <= target.p_WE[2] <= lowest
             and norm(target.v_WE) <= fastest
             and norm(subtract(target.p_WE, p_WE)) <= _NEAR
         ):
             return target
-        return self.limit_external((target,), p_WE, v_WE, safe_set, lowest)[0][0]
+        return self.limit_horizon((target,), p_WE, v_WE, safe_set, limits)[0][0]
 
     def is_up(self, target: EndEffectorTarget) -> bool:
         """Whether a target is at the lowest height or above: what came up from below is up."""
         return target.p_WE[2] <= self._limits[0]
 
-    def _limits_from(self, lowest: float) -> Limits:
-        """The limits, with the lowest z [m, NED] no higher than ``lowest``."""
+    def limits_from(self, lowest: float = -math.inf) -> Limits:
+        """The limits of targets from outside, of which the lowest height is none above ``lowest``.
+
+        ``lowest`` [m, NED] is where the end-effector came up from, if it is on its way from below.
+        """
         usual, highest, fastest = self._limits
         return max(usual, lowest), highest, fastest
 
@@ -350,9 +330,9 @@ class ReferenceGovernor:
         speed = 0.0 if motion.v is None else norm(finite_or_zero(motion.v))
         if speed > fastest + _TOLD:
             left |= _FAST
-        return self.reason(left, self._limits)
+        return self._reason(left, self._limits)
 
-    def reason(self, left: int, limits: Limits) -> str:
+    def _reason(self, left: int, limits: Limits) -> str:
         """Which of the ``limits`` have been left, in words; empty: none."""
         lowest, highest, fastest = limits
         said = {

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 
+from fsw.autopilot.control.press import PressTuning
 from fsw.autopilot.flight.land_detector import height_above_ground
 from fsw.autopilot.flight.modes.base import FlightMode
 from fsw.autopilot.flight.setpoints.generator import PositionGoal, ReferenceState, arrived
-from fsw.autopilot.flight.setpoints.reference_governor import ReferenceGovernor, lead_at
+from fsw.autopilot.flight.setpoints.reference_governor import Limits, ReferenceGovernor, lead_at
 from fsw.autopilot.flight.state import FlightState, SetpointMemory
-from fsw.autopilot.geometry.vectors import subtract
+from fsw.autopilot.geometry.vectors import add_scaled, clamp, dot, subtract
 from fsw.autopilot.model.kinematics import end_effector
 from fsw.autopilot.mpc.reference import still_at
 from fsw.autopilot.parameters.flight_config import FlightConfig
@@ -21,9 +22,15 @@ from fsw.autopilot.signals import (
     StateEstimate,
     Vec3,
 )
+from fsw.autopilot.tick_record import Tick
 from fsw.frozen import replace
 
 _OFF_PLAN = 0.05  # m; beyond what a disturbance alone does nearly always
+# m, that a surface is followed from where it was announced: one that comes as far as it does, one
+# that goes not far, because the other parts keep clear of where it was announced
+_BACK, _AFTER = 0.3, 0.03
+_FASTEST = 0.15  # m/s, of one that comes
+_NOTHING: Vec3 = (0.0, 0.0, 0.0)
 
 Horizon = tuple[tuple[EndEffectorTarget, ...], tuple[JointVector, ...]]
 """Targets at the nodes; joints at the nodes, or none where the arm is the planner's choice."""
@@ -39,7 +46,7 @@ class ReferenceHorizon:
     def warm_up(self, estimate: StateEstimate) -> None:
         """Compile every kernel."""
         here, rest = estimate.p_WB, (0.0, 0.0, 0.0)
-        self._governor.limit_external((still_at(here),), here, rest, SafeSet())
+        self._governor.limit_horizon((still_at(here),), here, rest, SafeSet())
 
     def __call__(
         self, mode: FlightMode, state: FlightState, estimate: StateEstimate, t_us: int
@@ -62,10 +69,10 @@ class ReferenceHorizon:
             return replace(state, limited="") if state.limited else state, (targets, joints)
         safe_set, why = state.kept.safe_set, ""
         if mode.external_reference:
-            state, lowest = self._came_up(state, targets[0])
-            targets, why = self._governor.limit_external(targets, p_WE, v_WE, safe_set, lowest)
+            state, limits = self._came_up(state, targets[0])
+            targets, why = self._governor.limit_horizon(targets, p_WE, v_WE, safe_set, limits)
         else:
-            targets = self._governor.limit_horizon(targets, p_WE, v_WE, safe_set)
+            targets, _ = self._governor.limit_horizon(targets, p_WE, v_WE, safe_set)
             if goal is not None:
                 why = self._governor.left_by(goal.motion)
         return replace(state, limited=why) if why != state.limited else state, (targets, joints)
@@ -84,16 +91,16 @@ class ReferenceHorizon:
         if not mode.external_reference:
             return target
         p_WE, v_WE = end_effector(self._config.airframe.bodies, estimate)
-        _, lowest = self._came_up(state, target)
-        return self._governor.limit_now(target, p_WE, v_WE, state.kept.safe_set, lowest)
+        _, limits = self._came_up(state, target)
+        return self._governor.limit_now(target, p_WE, v_WE, state.kept.safe_set, limits)
 
     def here(self, estimate: StateEstimate, t_us: int) -> EndEffectorTarget:
         """At rest where the end-effector is, from ``t_us`` [us] on."""
         p_WE, _ = end_effector(self._config.airframe.bodies, estimate)
         return still_at(p_WE, t_us, estimate.yaw)
 
-    def _came_up(self, state: FlightState, target: EndEffectorTarget) -> tuple[FlightState, float]:
-        """The state, and the lowest z [m, NED] of a reference from outside besides the usual one.
+    def _came_up(self, state: FlightState, target: EndEffectorTarget) -> tuple[FlightState, Limits]:
+        """The state, and the limits of a reference from outside.
 
         One that takes off comes up from where its mode began. Once it was up it goes no lower.
         """
@@ -101,7 +108,8 @@ class ReferenceHorizon:
         if not vehicle.is_up and self._governor.is_up(target):
             vehicle = replace(vehicle, is_up=True)
             state = replace(state, vehicle=vehicle)
-        return state, -math.inf if vehicle.is_up else vehicle.mode_origin[2]
+        came_from = -math.inf if vehicle.is_up else vehicle.mode_origin[2]
+        return state, self._governor.limits_from(came_from)
 
     def _generated(
         self,
@@ -155,3 +163,37 @@ def _led_aside(
             one = replace(one, p_WE=p)
         limited.append(one)
     return tuple(limited)
+
+
+def pressed_reference(
+    targets: tuple[EndEffectorTarget, ...], r: Tick, p_WE: Vec3, tuning: PressTuning
+) -> tuple[tuple[EndEffectorTarget, ...], tuple[Vec3, ...]]:
+    """The targets of a horizon for a tool at ``p_WE`` [m, NED], and the pushes on the base.
+
+    A surface is where it is felt, not where it was announced: along its normal the targets of a
+    tool in contact are moved to where the tool is. The plan counts on what the surface pushes back
+    in each step [m/s^2, NED], nothing where nothing is pressed. The force that is given now rises
+    and falls as the fast loop lets it.
+    """
+    k = r.pressing
+    if not k.contact:
+        if not any(target.force > 0.0 for target in targets):
+            return targets, ()
+        return targets, (_NOTHING,) * (len(targets) - 1)
+    n = (float(k.normal[0]), float(k.normal[1]), float(k.normal[2]))
+    moved, pushes = [], []
+    speed = clamp(k.surface_speed - k.mean_speed, 0.0, _FASTEST)
+    for target in targets:
+        ahead_s = 1e-6 * (target.t_us - targets[0].t_us)
+        if target.force > 0.0:
+            off = clamp(dot(n, subtract(p_WE, target.p_WE)), -_AFTER, _BACK) + ahead_s * speed
+            target = replace(
+                target,
+                p_WE=add_scaled(target.p_WE, n, off),
+                v_WE=add_scaled(target.v_WE, n, speed),
+            )
+        moved.append(target)
+        least, most = k.ramped - ahead_s * tuning.fall, k.ramped + ahead_s * tuning.rise
+        force = max(clamp(target.force, least, most), 0.0)
+        pushes.append(add_scaled(_NOTHING, n, force / r.mass))
+    return tuple(moved), tuple(pushes[:-1])

@@ -17,7 +17,7 @@ from fsw.autopilot.flight.plan_exchange import (
     coast,
     measured_state,
     nominal_at_rest,
-    plan_input,
+    planned_input,
     take_answer,
     with_arm_in_bounds,
     with_plan_state,
@@ -45,7 +45,6 @@ from tests.fsw.records import measured_motion
 PERIOD_US, TICK_US, START_US = 100_000, 2_000, 1_000_000
 NO_TIME = PlanTimings(0.0, 0.0, 0.0)
 MODEL = NominalModel(AIRFRAME, 1e-6 * TICK_US)
-BRAKE = Brake(AIRFRAME, InputLimits().tilt)
 STILL: Vec3 = (0.0, 0.0, 0.0)
 
 
@@ -80,14 +79,19 @@ REFUSAL = PlanFailure(3, SolverStatus.INFEASIBLE, "no", NO_TIME)
 
 @given(st.integers(0, 3 * PERIOD_US - 1))
 def test_the_input_in_use_is_that_of_the_plans_age(age_us: int) -> None:
-    u = plan_input(plan(), moving((1.0, 0.0, 0.0)), START_US + age_us, BRAKE)
+    u = planned_input(plan(), START_US + age_us)
+    assert u is not None
     assert u.a[0] == age_us // PERIOD_US
 
 
 @pytest.mark.requirement("REQ-PLAN-2")
 @pytest.mark.parametrize("age_us", [-1, 3 * PERIOD_US, 10**9])
 def test_outside_three_periods_a_plan_is_braked(age_us: int) -> None:
-    assert plan_input(plan(), moving((1.0, 0.0, 0.0)), START_US + age_us, BRAKE).a[0] < 0.0
+    assert planned_input(plan(), START_US + age_us) is None
+    exchange = PlanExchange(flight_config(body="points"))
+    r = with_plan_state(new_tick(3.5, 4, 2), moving((1.0, 0.0, 0.0)))
+    exchange.follow(PlanMemory(running=plan(), since_us=10**12), r, None, START_US + age_us, 1)
+    assert r.plan_input.a[0] < 0.0
 
 
 def test_a_plan_on_time_starts_where_it_says() -> None:

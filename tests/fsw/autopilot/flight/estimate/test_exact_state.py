@@ -9,7 +9,7 @@ import pytest
 
 from fsw.autopilot.estimation.estimator import estimate_state
 from fsw.autopilot.flight.estimate.exact_state import ExactState
-from fsw.autopilot.flight.loops import loops_of
+from fsw.autopilot.flight.fast_loop import loops_of
 from fsw.autopilot.flight.plan_exchange import nominal_at_rest
 from fsw.autopilot.flight.state import AIDED, COMPLETE, FlightState, first_state
 from fsw.autopilot.measurements import Sensor

@@ -11,13 +11,13 @@ from scipy.spatial.transform import Rotation
 from fsw.autopilot.control.cascade import in_hover
 from fsw.autopilot.estimation.dead_reckoning import moved_on
 from fsw.autopilot.estimation.fusion_memory import Reset
-from fsw.autopilot.flight.estimate.jump import held_along, returned, without_answer
+from fsw.autopilot.flight.estimate.jump import all_along, held_along, on_return, without_answer
 from fsw.autopilot.flight.plan_exchange import nominal_at_rest, with_plan_state
 from fsw.autopilot.flight.setpoints.generator import PositionGoal, ReferenceState
 from fsw.autopilot.flight.state import FlightState, PlanMemory, SetpointMemory
 from fsw.autopilot.geometry.rotation import wrap_angle, yaw_of
 from fsw.autopilot.model.airframe import AIRFRAME
-from fsw.autopilot.signals import MotionSetpoint, StateEstimate, StatusText
+from fsw.autopilot.signals import MotionSetpoint, StateEstimate
 from tests.fsw.autopilot.flight.in_flight import flying
 from tests.fsw.random_states import estimate_of
 
@@ -70,18 +70,19 @@ def test_plan_and_observer_come_along_when_positions_return(seed: int) -> None:
     found = turned_and_moved(
         carried, random.uniform(-0.3, 0.3, 3), random.uniform(-0.3, 0.3, 3), random.uniform(-1, 1)
     )
-    after = returned(state, found, before, [])
+    reset, _ = on_return(found, before)
+    record, after, _ = all_along(state.record, state, state.plan, reset)
+    after = replace(after, record=record)
     assert errors(after, found) == pytest.approx(errors(state, carried), abs=SEEN)
 
 
 @pytest.mark.requirement("REQ-EST-10")
 @pytest.mark.parametrize(("place", "texts"), [(0.019, 0), (0.021, 1)])
 def test_a_jump_of_more_than_20_mm_is_reported(place: float, texts: int) -> None:
-    state, before = moving(np.random.default_rng(1))
+    _, before = moving(np.random.default_rng(1))
     still = before._replace(v_WB=(0.0, 0.0, 0.0))
     found = turned_and_moved(still, np.array([0.0, -place, 0.0]), np.zeros(3), 0.0)
-    said: list[StatusText] = []
-    returned(state, found, still, said)
+    _, said = on_return(found, still)
     assert [text.text for text in said] == [
         "estimate moved by 21 mm, 0.000 rad: the plan moves along"
     ] * texts

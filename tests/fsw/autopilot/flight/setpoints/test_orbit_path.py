@@ -10,8 +10,14 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from fsw.autopilot.flight.setpoints.generator import PositionGoal, ReferenceState, step
-from fsw.autopilot.flight.setpoints.orbit_path import looking_at, max_orbit_speed, on_orbit
+from fsw.autopilot.flight.setpoints.generator import (
+    PositionGoal,
+    ReferenceState,
+    looking_at,
+    max_orbit_speed,
+    on_orbit,
+    step,
+)
 from fsw.autopilot.parameters.flight_config import SetpointLimits
 from fsw.autopilot.signals import Facing, MotionSetpoint, Orbit
 

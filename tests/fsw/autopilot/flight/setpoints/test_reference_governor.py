@@ -23,6 +23,7 @@ WALL = SafeSet((wall((-1.0, 0.0, 0.0), -1.0, 0.1),))
 STILL: Vec3 = (0.0, 0.0, 0.0)
 CONFIG = flight_config(body="points")
 GOVERNOR = ReferenceGovernor(CONFIG)
+LIMITS = GOVERNOR.limits_from()  # of targets from outside
 
 
 def horizon(first: Vec3, v: Vec3 = STILL) -> tuple[EndEffectorTarget, ...]:
@@ -40,7 +41,7 @@ def horizon(first: Vec3, v: Vec3 = STILL) -> tuple[EndEffectorTarget, ...]:
 def kept(
     targets: tuple[EndEffectorTarget, ...], p_WE: Vec3, v_WE: Vec3 = STILL
 ) -> tuple[EndEffectorTarget, ...]:
-    return GOVERNOR.limit_horizon(targets, p_WE, v_WE, WALL)
+    return GOVERNOR.limit_horizon(targets, p_WE, v_WE, WALL)[0]
 
 
 def test_the_paper_s_path_into_the_safety_zone_passes_untouched() -> None:
@@ -79,7 +80,7 @@ BRANCH = SafeSet((point((1.0, 0.0, -1.2), 0.3),))
 
 def test_a_path_that_passes_a_point_within_its_clearance_stays_as_it_is() -> None:
     targets = horizon((1.0, 0.25, -1.2), (0.3, 0.0, 0.0))
-    assert GOVERNOR.limit_horizon(targets, (0.9, 0.3, -1.2), STILL, BRANCH) is targets
+    assert GOVERNOR.limit_horizon(targets, (0.9, 0.3, -1.2), STILL, BRANCH)[0] is targets
 
 
 @given(st.floats(-math.pi, math.pi), st.floats(0.01, 0.3), st.floats(0.5, 3.0))
@@ -91,7 +92,7 @@ def test_nothing_pulls_deep_into_the_ball_of_a_point_or_fast_towards_it(
     p_WE = (1.0 + 0.35 * away[0], 0.35 * away[1], -1.2)
     inward = (-speed * away[0], -speed * away[1], 0.0)
     targets = (EndEffectorTarget(0, target, inward, STILL),)
-    (limited,) = GOVERNOR.limit_horizon(targets, p_WE, STILL, BRANCH)
+    ((limited,), _) = GOVERNOR.limit_horizon(targets, p_WE, STILL, BRANCH)
     assert math.dist(limited.p_WE, (1.0, 0.0, -1.2)) == pytest.approx(max(distance, 0.2))
     assert math.hypot(*limited.v_WE) <= 0.5 + 1e-9
 
@@ -157,7 +158,7 @@ def test_a_horizon_is_limited_with_the_barriers_own_braking() -> None:
     weaker = ReferenceGovernor(replace(CONFIG, planner=replace(CONFIG.planner, walls=walls)))
     targets, here = horizon((0.8, 0.0, -1.2), (3.0, 0.0, 0.0)), (0.4, 0.0, -1.2)
     faster, slower = (
-        one.limit_horizon(targets, here, STILL, WALL)[0].v_WE[0] for one in (GOVERNOR, weaker)
+        one.limit_horizon(targets, here, STILL, WALL)[0][0].v_WE[0] for one in (GOVERNOR, weaker)
     )
     assert 0.0 < slower < faster < 3.0
 
@@ -196,13 +197,14 @@ LOWEST_TIP = lowest_height(CONFIG) - CONFIG.surroundings.hanging
 def streamed(
     first: Vec3, v: Vec3 = STILL, here: Vec3 = (0.0, 0.0, -1.0), moves: Vec3 = STILL
 ) -> tuple[tuple[EndEffectorTarget, ...], str]:
-    return GOVERNOR.limit_external(horizon(first, v), here, moves, SafeSet())
+    return GOVERNOR.limit_horizon(horizon(first, v), here, moves, SafeSet(), LIMITS)
 
 
 def test_targets_from_outside_pass_between_floor_and_ceiling_at_a_speed_that_may_be_flown() -> None:
     targets = horizon((0.1, 0.0, -1.0), (0.6, -0.8, 0.3))
     moves = (0.5, -0.7, 0.3)
-    assert GOVERNOR.limit_external(targets, (0.0, 0.0, -1.0), moves, SafeSet()) == (targets, "")
+    same = GOVERNOR.limit_horizon(targets, (0.0, 0.0, -1.0), moves, SafeSet(), LIMITS)
+    assert same == (targets, "")
 
 
 @pytest.mark.parametrize(

@@ -8,8 +8,7 @@ from dataclasses import replace
 import pytest
 
 from fsw.autopilot.estimation.faults.sensor_fault import SensorFault
-from fsw.autopilot.flight.descent import Descent, forget_wind
-from fsw.autopilot.flight.modes.descend import Descend
+from fsw.autopilot.flight.modes.descend import Descend, Descent, forget_wind
 from fsw.autopilot.flight.plan_exchange import nominal_at_rest
 from fsw.autopilot.flight.safety.uncertain_clearance import InflatedSafeSet
 from fsw.autopilot.flight.state import Aiding, LostSensor
