@@ -13,13 +13,7 @@ from fsw.autopilot.model.kinematics import frame_of
 from fsw.autopilot.model.multibody import Bodies
 from fsw.autopilot.model.prediction import Array
 from fsw.autopilot.shapes.zones import FOLLOWS, all_moving_zones, shifts, zone_arrays
-from fsw.autopilot.signals import (
-    ConstraintReport,
-    EndEffectorTarget,
-    SafeSet,
-    StateEstimate,
-    Vec3,
-)
+from fsw.autopilot.signals import ConstraintReport, EndEffectorTarget, SafeSet, StateEstimate, Vec3
 from fsw.compiled import machine_code
 
 _REST: Vec3 = (0.0, 0.0, 0.0)

@@ -57,7 +57,7 @@ BELIEVED: Final = 8  # beside what came of the filter's parts: all stages were d
 def loops_of(config: FlightConfig) -> Cascade:
     """The loops of a configuration: our own, or what asks PX4's."""
     tick, clear = config.tick, _keep_clear(config)
-    if config.inner == "px4":
+    if config.is_above_px4:
         return Px4Loops(config.airframe, config.tuning, config.px4, tick, clear)
     return Cascade(config.airframe, config.tuning, config.inner, tick, clear)
 

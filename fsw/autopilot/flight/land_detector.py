@@ -81,10 +81,14 @@ def stands(config: FlightConfig, estimate: StateEstimate) -> bool:
     return height_above_ground(config, estimate) < config.limits.landed_height and slow
 
 
+def is_low(config: FlightConfig, estimate: StateEstimate) -> bool:
+    """Not clearly in the air: the plan may well be lower than the vehicle can be."""
+    return height_above_ground(config, estimate) < config.limits.airborne_height
+
+
 def standing_unclear(config: FlightConfig, estimate: StateEstimate) -> bool:
     """Neither at rest on the ground nor clearly in the air."""
-    low = height_above_ground(config, estimate) < config.limits.airborne_height
-    return low and not stands(config, estimate)
+    return is_low(config, estimate) and not stands(config, estimate)
 
 
 def may_be_low(config: FlightConfig, state: FlightState, estimate: StateEstimate) -> bool:

@@ -106,7 +106,7 @@ def analyse(config: FlightConfig, safe_set: SafeSet, loop: Tube) -> tuple[Findin
     for tuning, zones in ((planner.workspace, spheres), (planner.walls, others)):
         if zones:
             findings += _loop_beside(config, tuning, loop, SafeSet(tuple(zones)))
-    if config.inner == "px4":
+    if config.is_above_px4:
         findings += _px4_loops(config, loop, others)
     findings += _touched(config, safe_set, loop)
     if config.inner == "tracking":
@@ -136,7 +136,7 @@ def _loop_beside(
     disturbance = config.surroundings.disturbance
     if not config.follows_plan:
         return [_sampled(tuning, disturbance, config.planner.period)]
-    if config.inner == "px4" and not is_stable(config.px4):
+    if config.is_above_px4 and not is_stable(config.px4):
         return []  # nothing bounds it
     found = [_base_tube(tuning, loop, disturbance)]
     if config.inner == "tracking":
@@ -170,7 +170,7 @@ def warnings(findings: tuple[Finding, ...]) -> tuple[str, ...]:
 def loop_tube(config: FlightConfig) -> Tube:
     """Tube of the loops that follow the plan, ours or PX4's, per m/s^2 of disturbance."""
     pushed = config.surroundings.hanging, config.surroundings.disturbance_hold, config.tick
-    if config.inner == "px4":
+    if config.is_above_px4:
         return px4_tube(config.px4, *pushed)
     return tube(config.airframe, config.tuning.tracking, *pushed)
 

@@ -165,6 +165,11 @@ class FlightConfig:
         return self.inner != "pid"
 
     @property
+    def is_above_px4(self) -> bool:
+        """Whether the planner is above PX4, whose rotors they are."""
+        return self.inner == "px4"
+
+    @property
     def keeps_barriers(self) -> bool:
         """Whether it is promised; others are flown for comparison, to show what they do."""
         return self.controller == "blf" and not self.soft

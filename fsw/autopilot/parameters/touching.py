@@ -118,8 +118,7 @@ def _stroke(airframe: Airframe, home: tuple[float, ...], way: Array) -> float:
 def against_touching(config: FlightConfig, zone: Zone, loop: Tube) -> str:
     """Why this vehicle can promise nothing at a surface that it may touch; empty: it can."""
     touch, airframe, tuning = zone.touch, config.airframe, config.tuning.press
-    if touch is None:
-        return ""
+    assert touch is not None
     disturbance = config.surroundings.disturbance
     found = grip(airframe, tuning, _normal_in_body(zone), disturbance)
     if not math.isfinite(found.mass):
@@ -217,8 +216,7 @@ def _in_body(asked: Pressed) -> tuple[Array, Array]:
 def max_force(config: FlightConfig, zone: Zone, loop: Tube) -> float:
     """The largest force [N] that can be asked for at a surface that may be touched."""
     touch, tuning = zone.touch, config.tuning.press
-    if touch is None:
-        return 0.0
+    assert touch is not None
     found = grip(config.airframe, tuning, _normal_in_body(zone), config.surroundings.disturbance)
     bounded = touch.force_max - found.unsure - tuning.damping
     leaning = config.airframe.mass * _left(config, loop)
@@ -231,14 +229,10 @@ def _pushed(config: FlightConfig, zone: Zone, loop: Tube) -> float:
     return disturbance * loop.height if _is_level(zone) else base_reach(loop, disturbance)
 
 
-def _room(config: FlightConfig, found: Grip) -> float:
-    """How far [m] the base may be off its plan along the normal while the tool presses."""
-    return min(stand_off(config.planner.walls), found.inwards, found.outwards)
-
-
 def _covered(config: FlightConfig, zone: Zone, loop: Tube, found: Grip) -> float:
     """The largest force [N] that may come and go beside the worst disturbance."""
-    left, mass = _room(config, found) - _pushed(config, zone, loop), config.airframe.mass
+    room = min(stand_off(config.planner.walls), found.inwards, found.outwards)
+    left, mass = room - _pushed(config, zone, loop), config.airframe.mass
     unknown, each = of_contact(loop, 0.0, found.unsure, mass), of_contact(loop, 1.0, 0.0, mass)
     return (left - unknown) / each
 

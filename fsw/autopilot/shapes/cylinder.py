@@ -7,14 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from fsw.autopilot.shapes.kind import (
-    CENTRE_BALL,
-    Numbers,
-    ShapeKind,
-    Surface,
-    place_moved,
-    places,
-)
+from fsw.autopilot.shapes.kind import CENTRE_BALL, Numbers, ShapeKind, Surface, place_moved, places
 from fsw.autopilot.signals import Shape, Vec3, Zone
 from fsw.compiled import kernel
 

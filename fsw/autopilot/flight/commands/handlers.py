@@ -20,7 +20,7 @@ from fsw.autopilot.flight.situation import Situation
 from fsw.autopilot.model.arm_coordinates import arm_coordinates
 from fsw.autopilot.model.body import hull_reach
 from fsw.autopilot.parameters.flight_config import lowest_height
-from fsw.autopilot.shapes.zones import surface, surfaces
+from fsw.autopilot.shapes.zones import surface
 from fsw.autopilot.signals import (
     Arm,
     ChangeSpeed,
@@ -145,7 +145,7 @@ def _arm(action: Arm, context: Situation, modes: Modes) -> Decision:
 def _disarm(action: Disarm, context: Situation, modes: Modes) -> Decision:
     if not context.mode.armed:
         return Decision(ACCEPTED)
-    if context.landed or _is_above_px4(context):
+    if context.landed or context.config.is_above_px4:  # PX4 flies: it is given back
         return Decision(ACCEPTED, mode=Mode.DISARMED)
     if not action.force:
         return Decision(LATER, "not disarmed: the vehicle is in the air; land first or force")
@@ -340,7 +340,7 @@ def _inject_failure(action: InjectFailure, context: Situation, modes: Modes) -> 
 
 
 def _grip(action: Grip, context: Situation, modes: Modes) -> Decision:
-    if _is_above_px4(context):
+    if context.config.is_above_px4:
         return Decision(DENIED, GRIPPER_OF_PX4)
     return Decision(ACCEPTED, gripper=1.0 if action.closes else -1.0)
 
@@ -349,7 +349,7 @@ def _terminate(action: Order, context: Situation, modes: Modes) -> Decision:
     """Stop the rotors until the flight software is restarted."""
     if not context.mode.armed:
         return Decision(DENIED, "not terminated: the vehicle is not armed")
-    if _is_above_px4(context):
+    if context.config.is_above_px4:
         return Decision(DENIED, "not terminated: the rotors are PX4's; terminate it there")
     reason = "flight terminated by {sender}: the rotors stop"
     return Decision(ACCEPTED, reason, alarming=True, mode=Mode.FAULT)
@@ -422,11 +422,6 @@ def _blocked(context: Situation) -> str:
     return f"{reasons[0]}; the vehicle descends" if reasons else ""
 
 
-def _is_above_px4(context: Situation) -> bool:
-    """PX4 flies: what is disarmed here is given back to it."""
-    return context.config.inner == "px4"
-
-
 def _hovering_refusal(context: Situation) -> str | None:
     """Why the vehicle cannot accept a position goal now."""
     if not context.mode.armed:
@@ -464,10 +459,11 @@ def _out_of_bounds(place: Vec3, context: Situation) -> str | None:
 
 def _too_close(place: Vec3, context: Situation) -> str | None:
     body = context.config.body
-    found = surfaces(context.mission.safe_set, place, context.estimate.t_us)
-    for number, at in enumerate(found, start=1):
-        if not at.distance > hull_reach(body, at.normal):
-            return f"the place is too close to zone {number} of the safe set, or beyond it"
+    safe_set = context.mission.safe_set
+    for number in range(len(safe_set.zones)):
+        at = surface(safe_set, number, place, context.estimate.t_us)
+        if at is not None and not at.distance > hull_reach(body, at.normal):
+            return f"the place is too close to zone {number + 1} of the safe set, or beyond it"
     return None
 
 

@@ -47,6 +47,7 @@ from fsw.autopilot.signals import (
 APPROACH_DISTANCE = 0.1  # m from a surface that is to be pressed on, before and after
 _SIDEWAYS = 0.3  # of a normal, that is horizontal, from which on the nose turns to the surface
 ARRIVAL_TIMEOUT_US = 5_000_000  # at the end of a segment, for the end-effector to arrive
+_SPEED: Final = MissionAction.SPEED
 _GRIPPER: Final = {MissionAction.GRIP: 1.0, MissionAction.RELEASE: -1.0}
 
 
@@ -142,21 +143,32 @@ def begun(
     if progress.state is MissionState.COMPLETE:
         progress = replace(progress, current=0, reached=-1)
         flight = replace(flight, jumps=())
+    return _braked(flight, replace(progress, state=MissionState.ACTIVE), reference, limits)
+
+
+def _braked(
+    flight: MissionFlight,
+    progress: MissionProgress,
+    reference: EndEffectorTarget,
+    limits: MotionLimits,
+) -> MissionFlight:
+    """Brake from a reference, before the current step of the new progress begins."""
+    speeds = [one.speed for one in flight.steps[: progress.current] if one.action is _SPEED]
     return replace(
         flight,
         stage=Stage.BRAKE,
         segment=braking_segment(reference, limits),
         since_us=reference.t_us,
-        speed=_speed_before(flight.steps, progress.current),
-        progress=replace(progress, state=MissionState.ACTIVE),
+        speed=speeds[-1] if speeds else None,
+        progress=progress,
     )
 
 
 def paused(flight: MissionFlight) -> MissionFlight:
     """Pause the mission: its current step will start again."""
-    if flight.progress.state is not MissionState.ACTIVE:
-        return replace(flight, stage=Stage.IDLE, segment=None)
-    progress = replace(flight.progress, state=MissionState.PAUSED)
+    progress = flight.progress
+    if progress.state is MissionState.ACTIVE:
+        progress = replace(progress, state=MissionState.PAUSED)
     return replace(flight, stage=Stage.IDLE, segment=None, progress=progress)
 
 
@@ -169,14 +181,7 @@ def jumped(flight: MissionFlight, step: int, now_us: int, limits: MotionLimits) 
     flight = replace(flight, jumps=())
     if flight.segment is None:
         return replace(flight, progress=progress)
-    return replace(
-        flight,
-        stage=Stage.BRAKE,
-        segment=braking_segment(flight.segment.at(now_us), limits),
-        since_us=now_us,
-        speed=_speed_before(flight.steps, step),
-        progress=progress,
-    )
+    return _braked(flight, progress, flight.segment.at(now_us), limits)
 
 
 def advance(
@@ -243,7 +248,7 @@ def _set(
     flight: MissionFlight, number: int, step: MissionStep
 ) -> tuple[MissionFlight, MissionEvent]:
     """Do a step that moves nothing, and begin the next one."""
-    if step.action is MissionAction.SPEED:
+    if step.action is _SPEED:
         flight = replace(flight, speed=step.speed)
     following, event = _next(_reached(flight))
     if step.action is MissionAction.LOOK_AT:
@@ -396,9 +401,3 @@ def _next(
     if stops:
         return begins, MissionEvent(Mode.HOLD, "hold", f"mission holds before step {following}")
     return begins, NOTHING
-
-
-def _speed_before(steps: tuple[MissionStep, ...], number: int) -> float | None:
-    """The speed in force where the mission is begun at a step."""
-    speeds = [step.speed for step in steps[:number] if step.action is MissionAction.SPEED]
-    return speeds[-1] if speeds else None

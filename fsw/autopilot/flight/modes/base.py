@@ -15,12 +15,7 @@ from fsw.autopilot.flight.situation import Situation
 from fsw.autopilot.flight.state import FlightState, SetpointMemory
 from fsw.autopilot.mpc.reference import still_at
 from fsw.autopilot.parameters.flight_config import FlightConfig
-from fsw.autopilot.signals import (
-    EndEffectorTarget,
-    Mode,
-    StateEstimate,
-    StatusText,
-)
+from fsw.autopilot.signals import EndEffectorTarget, Mode, StateEstimate, StatusText
 from fsw.frozen import replace
 
 

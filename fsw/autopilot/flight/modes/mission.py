@@ -8,13 +8,7 @@ from fsw.autopilot.flight.commands.bounds import GRIPPER_OF_PX4
 from fsw.autopilot.flight.mission import sequencer as sequencer
 from fsw.autopilot.flight.mission.sequencer import MissionContext, Stage
 from fsw.autopilot.flight.mission.trajectory_segment import MotionLimits, PushSegment
-from fsw.autopilot.flight.modes.base import (
-    CONTINUE,
-    FlightMode,
-    Handover,
-    ModeResult,
-    Px4Mode,
-)
+from fsw.autopilot.flight.modes.base import CONTINUE, FlightMode, Handover, ModeResult, Px4Mode
 from fsw.autopilot.flight.setpoints.reference_governor import project
 from fsw.autopilot.flight.setpoints.target_check import TargetCheck
 from fsw.autopilot.flight.situation import Situation
@@ -94,7 +88,7 @@ class Mission(FlightMode):
             return state, CONTINUE
         if event.looks:
             state = replace(state, vehicle=replace(vehicle, look_at=event.look_at))
-        if event.gripper is not None and config.inner == "px4":
+        if event.gripper is not None and config.is_above_px4:
             event = replace(event, text=GRIPPER_OF_PX4, unmet=True)
         elif event.gripper is not None:
             state = replace(state, vehicle=replace(state.vehicle, gripper=event.gripper))

@@ -6,12 +6,7 @@ import math
 from typing import Final
 
 from fsw.autopilot.flight.land_detector import feel_ground, in_the_air
-from fsw.autopilot.flight.modes.base import (
-    CONTINUE,
-    FlightMode,
-    ModeResult,
-    Px4Mode,
-)
+from fsw.autopilot.flight.modes.base import CONTINUE, FlightMode, ModeResult, Px4Mode
 from fsw.autopilot.flight.setpoints.generator import PositionGoal
 from fsw.autopilot.flight.setpoints.offboard_setpoint import (
     Tilt,

@@ -2,12 +2,7 @@
 
 from __future__ import annotations
 
-from fsw.autopilot.flight.modes.base import (
-    CONTINUE,
-    FlightMode,
-    ModeResult,
-    Px4Mode,
-)
+from fsw.autopilot.flight.modes.base import CONTINUE, FlightMode, ModeResult, Px4Mode
 from fsw.autopilot.flight.situation import Situation
 from fsw.autopilot.flight.state import FlightState
 from fsw.autopilot.mpc.reference import sample

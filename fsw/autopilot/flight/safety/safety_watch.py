@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 
 from fsw.autopilot.control.tube import Tube, TubeAround, base_reach
-from fsw.autopilot.flight.land_detector import height_above_ground
+from fsw.autopilot.flight.land_detector import is_low
 from fsw.autopilot.flight.state import FlightState, SafetyMemory
 from fsw.autopilot.parameters.flight_config import FlightConfig
 from fsw.autopilot.signals import ConstraintReport, PredictionState, StateEstimate
@@ -88,7 +88,7 @@ class SafetyWatch:
             return memory if memory.off_plan_us < 0 else replace(memory, off_plan_us=-1)
         (x, y, z), (px, py, pz) = estimate.p_WB, nominal.p
         most = self.radius + wind + beyond_room(unsure)
-        down = 0.0 if self._is_low(estimate) else abs(z - pz)
+        down = 0.0 if is_low(self._config, estimate) else abs(z - pz)
         away = abs(x - px), abs(y - py), down
         off, near = not all(one <= most for one in away), max(away) > self._back
         before_us = memory.off_plan_us
@@ -148,11 +148,6 @@ class SafetyWatch:
             memory = replace(memory, counters=counters)
         last_us = _lasts(memory.filter_us, now_us, active=pushed, near=False, ends_us=_FILTER_US)
         return memory if last_us == memory.filter_us else replace(memory, filter_us=last_us)
-
-    def _is_low(self, estimate: StateEstimate) -> bool:
-        """On the ground, where the plan may well be lower than the vehicle can be."""
-        config = self._config
-        return height_above_ground(config, estimate) < config.limits.airborne_height
 
 
 def beyond_room(unsure: float) -> float:

@@ -165,13 +165,15 @@ class UncertainClearance:
             for more, there, gust in zip(wanted, granted, turned, strict=True)
         ]
         shortfall = max(short)
-        kept = before
-        if safe_set is not before.source or granted != before.added:
-            kept = _grown(safe_set, granted)
-        t_us, lacks = estimate.t_us, shortfall > SHORTFALL and before.sufficient_us >= 0
-        sufficient_us = before.sufficient_us if lacks else t_us
-        return InflatedSafeSet(
-            *(kept.source, kept.safe_set, kept.added, shortfall, sufficient_us, spread, t_us),
+        same = safe_set is before.source and granted == before.added
+        kept = before if same else _grown(safe_set, granted)
+        lacks = shortfall > SHORTFALL and before.sufficient_us >= 0
+        return kept._replace(
+            shortfall=shortfall,
+            sufficient_us=before.sufficient_us if lacks else estimate.t_us,
+            spread=spread,
+            t_us=estimate.t_us,
+            given=(),
             moved=moved,
         )
 

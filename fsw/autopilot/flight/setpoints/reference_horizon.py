@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from fsw.autopilot.control.press import PressTuning
-from fsw.autopilot.flight.land_detector import height_above_ground
+from fsw.autopilot.flight.land_detector import is_low
 from fsw.autopilot.flight.modes.base import FlightMode
 from fsw.autopilot.flight.setpoints.generator import PositionGoal, ReferenceState, arrived
 from fsw.autopilot.flight.setpoints.reference_governor import Limits, ReferenceGovernor, lead_at
@@ -139,8 +139,7 @@ class ReferenceHorizon:
         if nominal is None:
             return False
         (x, y, z), (px, py, pz) = estimate.p_WB, nominal.p
-        # On the ground the plan may well be lower.
-        low = height_above_ground(self._config, estimate) < self._config.limits.airborne_height
+        low = is_low(self._config, estimate)
         return math.hypot(px - x, py - y, 0.0 if low else pz - z) > _OFF_PLAN
 
 
