@@ -976,7 +976,6 @@ class FlightSnapshot:
     landed: bool = False  # stands on the ground, armed or not
     home: Home | None = None
     battery: BatteryState = BatteryState()
-    arming_refusal: str = ""  # why it cannot be armed; empty: it could be, or is
     offboard: OffboardReport = OffboardReport()
     intended_mode: Mode = Mode.HOLD  # what arming would lead to
     mission: MissionProgress = MissionProgress()

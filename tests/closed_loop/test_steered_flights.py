@@ -206,11 +206,11 @@ def test_the_battery_empties_as_the_vehicle_flies() -> None:
 def test_what_keeps_it_from_arming_is_on_show() -> None:
     flight = Flight(on_the_ground())
     flight.run(0.3)
-    assert flight.snapshot.arming_refusal == ""
+    assert flight.snapshot.arming.failed == ()
     tiny = SafeSet((target_sphere((0.0, 0.0, -0.225), 0.01),))
     flight.streamed = {"announced": (SafeSetAnnouncement(SIMULATOR, tiny),)}
     flight.run(0.3)
-    assert "not armed" in flight.snapshot.arming_refusal
+    assert flight.snapshot.arming.failed
 
 
 @pytest.mark.long

@@ -590,15 +590,13 @@ class Autopilot:
     ) -> FlightState:
         """Reference, margins, arming checks and battery, once a planning period."""
         target = self._horizon.target(self._commander.mode(state), state, estimate, now_us)
-        refusal, arming = self._commander.arming_report(state, estimate)
         airframe, period = self.config.airframe, 1e-6 * self.config.mpc_period_us
         thrust, levels = state.record.actuator_command.rotor_thrust, self._battery_levels
         return replace(
             state,
             constraints=self._safe_sets.margins(state.kept, estimate, target),
             reference=target if state.vehicle.flies else None,
-            arming_refusal=refusal,
-            arming=arming,
+            arming=self._commander.arming_report(state, estimate),
             battery=drained(airframe, levels, state.battery, thrust, period),
         )
 

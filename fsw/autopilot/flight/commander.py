@@ -122,20 +122,14 @@ class Commander:
         laws = self._config, self._contradiction, self._heaviest
         return Situation(state, estimate, *laws, sender, known)
 
-    def arming_report(
-        self, state: FlightState, estimate: StateEstimate
-    ) -> tuple[str, ArmingReport]:
-        """Why the vehicle cannot be armed now, and which checks fail, for telemetry.
-
-        Empty if it could be armed, or is; of one that is armed, the report says what is ill.
-        """
+    def arming_report(self, state: FlightState, estimate: StateEstimate) -> ArmingReport:
+        """Which arming checks fail, for telemetry; of a vehicle that is armed, what is ill."""
         if state.vehicle.armed:
-            sentence, report = "", ArmingReport(ill=unhealthy(state.vehicle.conditions))
+            report = ArmingReport(ill=unhealthy(state.vehicle.conditions))
         else:
             found = arming.failed(self.situation(state, estimate))
             report = ArmingReport(tuple([number for number, _ in found]))
-            sentence = arming.joined(found) if found else ""
-        return sentence, state.arming if report == state.arming else report
+        return state.arming if report == state.arming else report
 
     def check_failsafes(
         self, state: FlightState, estimate: StateEstimate, texts: list[StatusText]

@@ -114,7 +114,6 @@ _PLACES: Final = {
     "landed": "state.vehicle.landed",
     "home": "state.vehicle.home",
     "battery": "state.battery",
-    "arming_refusal": "state.arming_refusal",
     "intended_mode": "state.vehicle.intended_mode",
     "mission": "state.mission.flight.progress",
     "failsafe_from": "state.vehicle.failsafe_from",

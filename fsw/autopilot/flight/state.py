@@ -296,7 +296,6 @@ class FlightState:
     setpoint: SetpointMemory = field(default_factory=SetpointMemory)
     offboard: OffboardMemory = field(default_factory=OffboardMemory)
     battery: BatteryState = field(default_factory=BatteryState)
-    arming_refusal: str = ""
     arming: ArmingReport = field(default_factory=ArmingReport)
     safety: SafetyMemory = field(default_factory=SafetyMemory)
     fusion: FusionMemory | None = None  # where sensors have times of their own

@@ -86,7 +86,7 @@ def sys_status(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValue
     if Condition.SENSOR_LOST.value in snapshot.failures:
         for sensor in snapshot.sensors_lost:
             health &= ~_LOST.get(sensor, 0)
-    if snapshot.arming_refusal:
+    if snapshot.arming.failed:
         health &= ~_PREARM
     if battery.charge >= BatteryWarning.CRITICAL:
         health &= ~_BATTERY

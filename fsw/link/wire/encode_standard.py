@@ -67,7 +67,7 @@ def heartbeat(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValues
         acts = snapshot.failures or snapshot.failsafe_from is not None
         status = _CRITICAL if acts else _ACTIVE
     else:
-        status = _UNINIT if snapshot.arming_refusal or snapshot.failures else _STANDBY
+        status = _UNINIT if snapshot.arming.failed or snapshot.failures else _STANDBY
     return (
         custom_mode(shown),
         context.facts.airframe.mav_type,

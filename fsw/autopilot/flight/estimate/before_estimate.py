@@ -6,7 +6,7 @@ from typing import Final
 
 from fsw.autopilot.estimation.faults.sensor_fault import SensorFault, sentence
 from fsw.autopilot.estimation.fusion_memory import FusionMemory
-from fsw.autopilot.flight.commands.arming import NO_ESTIMATE, joined
+from fsw.autopilot.flight.commands.arming import NO_ESTIMATE
 from fsw.autopilot.flight.estimate.estimator_report import AIDS_PLACE
 from fsw.autopilot.flight.failsafe.conditions import Action, Condition
 from fsw.autopilot.flight.failsafe.table import ROWS
@@ -27,7 +27,6 @@ from fsw.frozen import replace
 TOLD_AFTER_US: Final = 1_000_000  # a filter that is given all it needs has begun long before
 _LATELY: Final = 1.0  # s, in which a fault of a sensor may be why
 _REPORT: Final = ArmingReport((NO_ESTIMATE[0],))  # the same object: it is not looked at again
-_REFUSAL: Final = joined((NO_ESTIMATE,))
 
 
 def told(state: FlightState, tick_us: int) -> tuple[StatusText, ...]:
@@ -106,7 +105,6 @@ def nothing_known(
         offboard=report(state, t_us),
         mission=state.mission.flight.progress,
         safety=state.safety.counters,
-        arming_refusal=_REFUSAL,
         log_failure=state.host.log_failure,
         arming=_REPORT,
         safe_set=state.mission.safe_set,

@@ -13,6 +13,7 @@ from fsw.autopilot.flight.situation import Situation
 from fsw.autopilot.geometry.geodesy import to_global, to_local
 from fsw.autopilot.shapes.ball import point
 from fsw.autopilot.shapes.half_space import wall
+from fsw.autopilot.shapes.target_sphere import target_sphere
 from fsw.autopilot.signals import (
     CommandRequest,
     CommandResult,
@@ -138,6 +139,12 @@ def test_a_goto_too_close_to_a_point_is_refused() -> None:
     decision = decided(9.0, 0.4, -3.0, 1, context=near)
     assert decision.result == DENIED
     assert "zone 1" in decision.reason
+
+
+def test_a_zone_is_named_by_its_own_number_though_one_before_it_has_no_place() -> None:
+    zones = target_sphere((0.0, 0.0, -0.2), 0.5), point((9.0, 0.0, -3.0), 0.5)
+    near = having(HOVERING, safe_set=SafeSet(zones))
+    assert "zone 2" in decided(9.0, 0.4, -3.0, 1, context=near).reason
 
 
 def test_home_is_set_here_or_at_a_place() -> None:

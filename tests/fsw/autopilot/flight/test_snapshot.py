@@ -8,6 +8,7 @@ from typing import Any, get_args, get_origin, get_type_hints
 from fsw.autopilot.flight.failsafe.conditions import Condition
 from fsw.autopilot.flight.snapshot import Shown
 from fsw.autopilot.signals import (
+    ArmingReport,
     FlightSnapshot,
     HostHealth,
     Mode,
@@ -25,7 +26,7 @@ FRAME = SensorFrame(2_000, NONE, NONE, (1.0, *NONE), NONE, (0.1, 0.2, -9.7), (0.
 def shown(**changes: Any) -> Shown:
     state = flying(Mode.LAND, gripper=1.0, failsafe_from=Mode.ORBIT, **changes)
     full = HostHealth(log_failure="the disk is full")
-    state = replace(state, arming_refusal="it may not arm", host=full)
+    state = replace(state, arming=ArmingReport((5,)), host=full)
     r = state.record.copy()
     r.state_estimate = vehicle_at((1.0, 2.0, -3.0), t_us=2_000)
     r.plan_input = PlanInput((0.1, 0.2, 0.3), 0.4, (0.5, 0.6))
@@ -43,7 +44,7 @@ def test_every_field_is_found_in_the_state() -> None:
     assert one.accel_B == FRAME.accel_B
     assert one.payload == PayloadReport(True, 0.25)
     assert one.touching is None
-    assert (one.arming_refusal, one.log_failure) == ("it may not arm", "the disk is full")
+    assert (one.arming, one.log_failure) == (ArmingReport((5,)), "the disk is full")
     assert (one.intended_mode, one.failsafe_from) == (one.state.vehicle.intended_mode, Mode.ORBIT)
 
 

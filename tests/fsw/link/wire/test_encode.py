@@ -12,6 +12,7 @@ from fsw.autopilot.flight.failsafe.conditions import Condition
 from fsw.autopilot.measurements import Sensor
 from fsw.autopilot.model.airframe import AIRFRAME
 from fsw.autopilot.signals import (
+    ArmingReport,
     AttitudeSetpoint,
     BatteryWarning,
     ConstraintKind,
@@ -427,7 +428,7 @@ def test_a_generic_autopilot_does_not_say_px4() -> None:
 
 
 def test_what_forbids_arming_takes_the_prearm_bit_alone() -> None:
-    refused = replace(SNAPSHOT, arming_refusal="not armed: standing is unclear")
+    refused = replace(SNAPSHOT, arming=ArmingReport((5,)))
     status = read_back(stream_of(ids.SYS_STATUS), refused)
     lost = status.onboard_control_sensors_present & ~status.onboard_control_sensors_health
     assert lost == dialect.MAV_SYS_STATUS_PREARM_CHECK
@@ -447,7 +448,7 @@ def test_without_a_home_there_is_no_home_position() -> None:
     ("changes", "base_mode", "status"),
     [
         ({"mode": Mode.DISARMED, "armed": False}, 29, 3),
-        ({"mode": Mode.DISARMED, "armed": False, "arming_refusal": "not armed: why"}, 29, 0),
+        ({"mode": Mode.DISARMED, "armed": False, "arming": ArmingReport((5,))}, 29, 0),
         ({"mode": Mode.DISARMED, "armed": False, "intended_mode": Mode.OFFBOARD}, 17, 3),
         ({"mode": Mode.DISARMED, "armed": False, "failures": ("x",)}, 29, 0),
         ({"mode": Mode.HOLD}, 157, 4),
