@@ -616,8 +616,10 @@ class Autopilot:
             if not r.flags & GATE_NEEDED:  # what flies is armed
                 return wanted, r, False
         elif armed:
-            idle = self.config.limits.idle_thrust
-            wanted = ActuatorCommand((idle,) * airframe.rotors, self._let_down(estimate))
+            # A folded arm hangs down without swinging through.
+            torque = [-c * rate for c, rate in zip(self._damping, estimate.qd_arm, strict=True)]
+            idle = (self.config.limits.idle_thrust,) * airframe.rotors
+            wanted = ActuatorCommand(idle, tuple(torque))
             r = at_rest(airframe, estimate, r)
         else:
             wanted = stopped(airframe)
@@ -629,10 +631,6 @@ class Autopilot:
             r.flags, r.margin = found.flags, found.margin
         r.actuator_command = sent
         return sent, r, replaced
-
-    def _let_down(self, estimate: StateEstimate) -> JointVector:
-        """Joint torques (j,) [N m] that let a folded arm hang without swinging through."""
-        return tuple([-c * rate for c, rate in zip(self._damping, estimate.qd_arm, strict=True)])
 
     def _see_damage(self, state: FlightState, r: Tick, controlled: Controlled) -> Damage:
         """What is known of the actuators. Reads estimate, joints; writes watch.

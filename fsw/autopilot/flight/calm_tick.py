@@ -74,7 +74,7 @@ class CalmTick:
                 return None
             exact = self.step(before, reading_of(frame), now_us)
             return None if exact is None else (exact, None)
-        if not self._fast.commands_rotors or any(map(_is_range, inputs.samples)):
+        if self._config.is_above_px4 or any(map(_is_range, inputs.samples)):
             return None  # the land detector looks at a range
         r = before.copy()
         run = self._fast.calm(r, self._watch.upright, self._zones, self._tube)

@@ -11,10 +11,10 @@ from fsw.autopilot.control.press import off_surface
 from fsw.autopilot.control.tube import base_reach
 from fsw.autopilot.flight.commands import arming
 from fsw.autopilot.flight.commands.dedup import answered_before, remember, still_true
-from fsw.autopilot.flight.commands.handlers import Decision, decide, decide_without_estimate
+from fsw.autopilot.flight.commands.handlers import Decision, decide
 from fsw.autopilot.flight.failsafe.conditions import NOTHING_DONE, Action
 from fsw.autopilot.flight.failsafe.response import overridden, respond
-from fsw.autopilot.flight.failsafe.table import SLOW_US, active, quickly_active, unhealthy
+from fsw.autopilot.flight.failsafe.table import ROWS, SLOW_US, active, quickly_active
 from fsw.autopilot.flight.land_detector import in_the_air, stands
 from fsw.autopilot.flight.modes import MODES
 from fsw.autopilot.flight.modes.base import CONTINUE, FlightMode, Handover
@@ -87,7 +87,7 @@ class Commander:
 
         Before the first estimate nothing of it is ``known``, and what needs one is put off.
         """
-        acks, judge = [], decide if known else decide_without_estimate
+        acks = []
         for command in commands:
             request, memory = command.request, state.vehicle.answered
             if state.vehicle.restarts:  # it would be undone
@@ -99,7 +99,7 @@ class Commander:
                 result = before.result
             else:
                 context = self.situation(state, estimate, request.sender, known=known)
-                decision = judge(command, context, self._modes)
+                decision = decide(command, context, self._modes)
                 result = decision.result
                 texts += _reason(decision)
                 state = self._carry_out(state, decision, estimate, texts)
@@ -125,7 +125,8 @@ class Commander:
     def arming_report(self, state: FlightState, estimate: StateEstimate) -> ArmingReport:
         """Which arming checks fail, for telemetry; of a vehicle that is armed, what is ill."""
         if state.vehicle.armed:
-            report = ArmingReport(ill=unhealthy(state.vehicle.conditions))
+            ill = [one.value for one in state.vehicle.conditions if ROWS[one].component is not None]
+            report = ArmingReport(ill=tuple(ill))
         else:
             found = arming.failed(self.situation(state, estimate))
             report = ArmingReport(tuple([number for number, _ in found]))

@@ -145,11 +145,6 @@ class FastLoop:
         # The filter's parts alone.
         self.filter: FilterCall = partial(self._call, r, *no_loops, self._no_frame)
 
-    @property
-    def commands_rotors(self) -> bool:
-        """Whether these are our own loops."""
-        return self._px4 is None
-
     def expected(self, r: Tick, *, explains: bool = True, judged: bool = False) -> Expected:
         """What the commands sent last make of joints and vehicle; it is good until the next call.
 

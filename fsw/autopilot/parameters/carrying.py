@@ -39,9 +39,10 @@ def payload_range(config: FlightConfig, loop: Tube) -> PayloadRange:
     """The range of a vehicle with the loop ``loop_tube(config)``."""
     airframe = config.airframe
     followed = loop.acceleration * config.surroundings.disturbance
+    lifted = _THRUST * airframe.full_thrust * math.cos(airframe.tilt_max)
     bounds = (
         *_by_joints(airframe, followed),
-        PayloadRange(_by_thrust(airframe, GRAVITY + followed), "the rotors' thrust"),
+        PayloadRange(lifted / (GRAVITY + followed) - airframe.mass, "the rotors' thrust"),
         PayloadRange(_by_balance(airframe), "the rotors' torque at the arm's full reach"),
         PayloadRange(HEAVIEST * airframe.mass, "its loss in flight"),
     )
@@ -90,11 +91,6 @@ def _by_joints(airframe: Airframe, followed: float) -> list[PayloadRange]:
         held = _per(most, GRAVITY * across + followed) - own
         found.append(PayloadRange(_per(held, length), f"joint {k + 1}'s torque"))
     return found
-
-
-def _by_thrust(airframe: Airframe, field: float) -> float:
-    most = _THRUST * airframe.full_thrust
-    return most * math.cos(airframe.tilt_max) / field - airframe.mass
 
 
 def _by_balance(airframe: Airframe) -> float:

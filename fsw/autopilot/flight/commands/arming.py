@@ -106,10 +106,6 @@ def _battery(context: Situation) -> str:
     return f"the battery is nearly empty: {left}"
 
 
-def _inconsistent(context: Situation) -> str:
-    return "; ".join(context.mission.refusals)
-
-
 def _outside(context: Situation) -> str:
     margin = min(context.state.constraints.margins, default=math.inf)
     if margin >= 0.0:
@@ -153,7 +149,12 @@ CHECKS: Final = (
         lambda c: c.against,
         permanent=True,
     ),
-    ArmingCheck(Subject.SAFE_SET, "The safe set cannot be kept", _inconsistent, permanent=True),
+    ArmingCheck(
+        Subject.SAFE_SET,
+        "The safe set cannot be kept",
+        lambda c: "; ".join(c.mission.refusals),
+        permanent=True,
+    ),
     ArmingCheck(Subject.SAFE_SET, "The vehicle is outside its safe set", _outside),
     ArmingCheck(Subject.JOINTS, "The arm swings, or is beyond its limits", _joints),
     ArmingCheck(

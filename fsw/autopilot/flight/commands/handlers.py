@@ -101,22 +101,19 @@ Modes = Mapping[Mode, FlightMode]
 
 
 def decide(command: Command, context: Situation, modes: Modes) -> Decision:
-    """Accept a command with its effects, or refuse it with a reason."""
+    """Accept a command with its effects, or refuse it with a reason.
+
+    Before the first estimate what needs one is put off.
+    """
     action = command.action
+    if not (context.known or isinstance(action, _NEED_NO_ESTIMATE) or action in _ORDERS_WITHOUT):
+        return Decision(LATER, "command refused: there is no valid state estimate yet")
     handler = COMMAND_HANDLERS[action if isinstance(action, Order) else type(action)]
     decision: Decision = handler(action, context, modes)
     if "{sender}" not in decision.reason:
         return decision
     sender = "{}/{}".format(*command.request.sender)
     return replace(decision, reason=decision.reason.replace("{sender}", sender))
-
-
-def decide_without_estimate(command: Command, context: Situation, modes: Modes) -> Decision:
-    """The same before the first estimate: what needs one is put off."""
-    action = command.action
-    if isinstance(action, _NEED_NO_ESTIMATE) or action in _ORDERS_WITHOUT_ESTIMATE:
-        return decide(command, context, modes)
-    return Decision(LATER, "command refused: there is no valid state estimate yet")
 
 
 def _reject(action: Rejected, context: Situation, modes: Modes) -> Decision:
@@ -409,7 +406,7 @@ COMMAND_HANDLERS: Final[dict[type[CommandAction] | Order, _Handler]] = {
 }
 # The vehicle cannot be armed then, and so is not.
 _NEED_NO_ESTIMATE: Final = (Arm, Disarm, InjectFailure, Rejected)
-_ORDERS_WITHOUT_ESTIMATE: Final = frozenset(
+_ORDERS_WITHOUT: Final = frozenset(
     {Order.TERMINATE, Order.CHECK_ARMING, Order.RESTART, Order.NOTHING}
 )
 

@@ -45,7 +45,7 @@ class Failsafe:
     delayed: bool = False  # holds for COM_FAIL_ACT_T before it returns or lands
     within_us: int = AT_ONCE_US  # until it is reported, beyond the time of a parameter
     parameters: tuple[str, ...] = ()  # that belong to it
-    component: Subject | None = None  # which is reported as unhealthy while it lasts
+    component: Subject | None = None  # which is ill while it lasts; on the ground, checks say it
     takeover: bool = True  # the pilot can fly another mode while it acts; else Descend alone
 
     def action(self, context: Situation) -> Action:
@@ -426,14 +426,6 @@ ROWS: Final = {row.condition: row for row in FAILSAFES}
 FAULTS: Final = frozenset(row.condition for row in FAILSAFES if row.of_vehicle)
 _QUICK: Final = tuple([row for row in FAILSAFES if not row.slow])
 BLOCKING: Final = frozenset(row.condition for row in FAILSAFES if not row.takeover)
-
-
-def unhealthy(conditions: tuple[Condition, ...]) -> tuple[str, ...]:
-    """Those of the active conditions that make a component unhealthy, by name.
-
-    On the ground the arming checks say it. They are about arming, and an armed vehicle has none.
-    """
-    return tuple([one.value for one in conditions if ROWS[one].component is not None])
 
 
 def active(context: Situation) -> tuple[Failsafe, ...]:
