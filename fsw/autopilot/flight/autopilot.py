@@ -143,16 +143,7 @@ class Autopilot:
             *(config, self._fast, self._damage, self._watch, self._sensed, self.zones_now)
         )
         self._accuracy = AccuracyWatch(config, self._safe_sets.loop_tube)
-        self._clearance = UncertainClearance(
-            limits.clearance_sigmas,
-            config.body,
-            config.airframe.bodies,
-            config.planner.tunings,
-            # Half a period until one is asked for, what it takes then, and the loop's own lag.
-            0.5 * config.planner.period
-            + config.plan_delay_ticks * config.tick
-            + self._cascade.law.filter.lag,
-        )
+        self._clearance = UncertainClearance(config, self._cascade.law.filter.lag)
         self._room = ZoneRoom(config)
         low, critical = limits.battery_low, limits.battery_critical
         self._battery_levels = low, critical, limits.battery_emergency

@@ -11,6 +11,7 @@ from fsw.autopilot.estimation.faults.sensor_fault import Health, fault_name
 from fsw.autopilot.estimation.fusion_memory import FusionMemory
 from fsw.autopilot.estimation.sensors import SENSORS
 from fsw.autopilot.estimation.turned_covariance import SAME_AXES, Vec6, turned_covariance
+from fsw.autopilot.geometry.vectors import three
 from fsw.autopilot.measurements import Sensor
 from fsw.autopilot.signals import (
     EstimatorReport,
@@ -64,7 +65,7 @@ def estimator_report(
     what is aided and has not drifted, and go by the filter alone.
     """
     x, entries = memory.numbers[0], covariance.ravel().tolist()
-    variances = entries[:: ERRORS + 1]
+    variances, bias = tuple(entries[:: ERRORS + 1]), tuple(x["bias"].tolist())
     for k, more in zip(_OF_POSE, lasting, strict=True):
         entries[(ERRORS + 1) * k] += more
     without = unaided(memory, now)
@@ -73,10 +74,10 @@ def estimator_report(
         t_us=estimate.t_us,
         pose_covariance=_pose(entries),
         velocity_covariance=_motion(covariance, estimate),
-        accel_bias=_three(x["bias"][:3].tolist()),
-        gyro_bias=_three(x["bias"][3:].tolist()),
-        accel_bias_variance=_three(variances[BA : BA + 3]),
-        gyro_bias_variance=_three(variances[BG : BG + 3]),
+        accel_bias=three(bias, 0),
+        gyro_bias=three(bias, 3),
+        accel_bias_variance=three(variances, BA),
+        gyro_bias_variance=three(variances, BG),
         pose_delay=float(x["pose_delay"]),
         sensors=sensors,
         ratios=_ratios(sensors),
@@ -158,7 +159,7 @@ def _ratios(sensors: tuple[SensorReport, ...]) -> TestRatios:
     return TestRatios(**found)
 
 
-def _flags(variances: list[float], sensors: tuple[SensorReport, ...], *, aided: bool) -> int:
+def _flags(variances: tuple[float, ...], sensors: tuple[SensorReport, ...], *, aided: bool) -> int:
     """ESTIMATOR_STATUS_FLAGS: what is known, and what of the sensors is doubted."""
     d = variances
     placed = max(d[P], d[P + 1]) < _KNOWN_PLACE**2
@@ -184,11 +185,6 @@ def _motion(covariance: Array, estimate: StateEstimate) -> tuple[float, ...]:
     found = turned_covariance(covariance, (V, BG), (back, SAME_AXES))
     upper: tuple[float, ...] = _upper(found.ravel().tolist())
     return upper
-
-
-def _three(values: list[float]) -> Vec3:
-    a, b, c = values
-    return a, b, c
 
 
 def _roots(variance: Vec3) -> Vec3:

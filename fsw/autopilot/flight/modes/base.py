@@ -129,11 +129,6 @@ class FlightMode:
         return self.generator.target(reference, t_us)
 
 
-def moved(state: FlightState, estimate: StateEstimate) -> FlightState:
-    """The state of a vehicle that moves: the land detector begins anew."""
-    return replace(state, vehicle=replace(state.vehicle, moved_us=estimate.t_us))
-
-
 def touch_down(
     config: FlightConfig, state: FlightState, estimate: StateEstimate
 ) -> tuple[FlightState, ModeResult]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
+from fsw.autopilot.flight.commands.bounds import motion_refusal
 from fsw.autopilot.flight.land_detector import feel_ground, in_the_air
 from fsw.autopilot.flight.modes.base import CONTINUE, FlightMode, ModeResult, Px4Mode
 from fsw.autopilot.flight.setpoints.generator import PositionGoal
@@ -14,7 +15,6 @@ from fsw.autopilot.flight.setpoints.offboard_setpoint import (
     attitude_refusal,
     finite_or_zero,
     joints_refusal,
-    motion_refusal,
     tilted,
     turn_level,
 )

@@ -2,15 +2,9 @@
 
 from __future__ import annotations
 
+from fsw.autopilot.flight.land_detector import in_the_air
 from fsw.autopilot.flight.mission.sequencer import nearest
-from fsw.autopilot.flight.modes.base import (
-    CONTINUE,
-    FlightMode,
-    Handover,
-    ModeResult,
-    Px4Mode,
-    moved,
-)
+from fsw.autopilot.flight.modes.base import CONTINUE, FlightMode, Handover, ModeResult, Px4Mode
 from fsw.autopilot.flight.setpoints.generator import PositionGoal, arrived
 from fsw.autopilot.flight.situation import Situation
 from fsw.autopilot.flight.state import FlightState, SetpointMemory
@@ -61,7 +55,7 @@ class Return(FlightMode):
     def update(self, state: FlightState, estimate: StateEstimate) -> tuple[FlightState, ModeResult]:
         """Home, wait there, then land; or stay there."""
         if not _is_home(state.setpoint):
-            return moved(state, estimate), CONTINUE
+            return in_the_air(state, estimate), CONTINUE
         wait = self.config.limits.return_wait
         if wait < 0.0:
             return state, ModeResult(Mode.HOLD, "return point reached")

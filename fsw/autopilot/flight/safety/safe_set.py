@@ -98,15 +98,14 @@ class SafeSetCheck:
         texts: list[StatusText],
         *,
         flies: bool,
-        armed: bool | None = None,
-        target: EndEffectorTarget | None = None,
+        armed: bool,
+        target: EndEffectorTarget | None,
     ) -> MissionMemory:
         """Take in what was uploaded and announced; in flight only what can be kept.
 
-        A vehicle that is ``armed``, by default one that flies, must be inside of it, with the zones
-        that follow the ``target`` if there is one. Of an upload all is taken or nothing.
+        A vehicle that is ``armed`` must be inside of it, with the zones that follow the ``target``
+        if there is one. Of an upload all is taken or nothing.
         """
-        armed = flies if armed is None else armed
         here = _Vehicle(estimate, target, armed, flies)
         update = inputs.mission
         if update is not None:

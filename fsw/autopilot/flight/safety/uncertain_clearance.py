@@ -24,13 +24,13 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from fsw.autopilot.barriers.safe_approach import BarrierTuning, stand_off
+from fsw.autopilot.barriers.safe_approach import stand_off
 from fsw.autopilot.estimation.error_state import ERRORS, TH, Array, P
 from fsw.autopilot.estimation.turned_covariance import SAME_AXES, Vec6, turned_covariance
 from fsw.autopilot.geometry.vectors import dot, norm
 from fsw.autopilot.model.body import Body
 from fsw.autopilot.model.kinematics import frame_of, position
-from fsw.autopilot.model.multibody import Bodies
+from fsw.autopilot.parameters.flight_config import FlightConfig
 from fsw.autopilot.shapes import kind_of
 from fsw.autopilot.shapes.kind import ShapeKind
 from fsw.autopilot.shapes.zones import all_planes
@@ -108,22 +108,15 @@ class InflatedSafeSet(NamedTuple):
 class UncertainClearance:
     """Grows the clearances of one configuration."""
 
-    def __init__(
-        self,
-        sigmas: float,
-        body: Body,
-        bodies: Bodies,
-        tunings: tuple[BarrierTuning, BarrierTuning],
-        lag: float,
-    ) -> None:
-        """Keep ``sigmas`` [1] standard deviations for a body of a vehicle of ``bodies``.
-
-        A plan takes effect, and the vehicle follows it, after ``lag`` [s] on average.
-        """
+    def __init__(self, config: FlightConfig, loop_lag: float) -> None:
+        """The vehicle follows a plan after ``loop_lag`` [s]."""
+        planner, tunings = config.planner, config.planner.tunings
+        # Half a period until a plan is asked for, what it takes then, and the loop's own lag.
+        lag = 0.5 * planner.period + config.plan_delay_ticks * config.tick + loop_lag
         # A plan keeps S(d) + n v: against a boundary that comes at r, d is less by r / k_S.
         self._lead = 1.0 / tunings[0].slope + lag
-        self._sigmas, self._bodies = sigmas, bodies
-        self._places, self._radii = _places(body)
+        self._sigmas, self._bodies = config.limits.clearance_sigmas, config.airframe.bodies
+        self._places, self._radii = _places(config.body)
         self._stand_off, self._stand_off_inside = (stand_off(one) for one in tunings)
         self._known = (SafeSet(), *_kinds_and_normals(SafeSet()))
 

@@ -6,7 +6,6 @@ import math
 from dataclasses import dataclass
 
 from fsw.autopilot.flight.commands.bounds import MAX_RATE
-from fsw.autopilot.flight.commands.bounds import motion_refusal as motion_refusal
 from fsw.autopilot.geometry.rotation import euler_zyx, matrix_from_quaternion
 from fsw.autopilot.geometry.vectors import clamp_magnitude
 from fsw.autopilot.model.airframe import GRAVITY, Airframe

@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import pytest
 
-from fsw.autopilot.flight.modes.base import CONTINUE, FlightMode, moved
+from fsw.autopilot.flight.land_detector import in_the_air
+from fsw.autopilot.flight.modes.base import CONTINUE, FlightMode
 from fsw.autopilot.flight.modes.hold import Hold
 from fsw.autopilot.flight.modes.land import Land
 from fsw.autopilot.flight.modes.takeoff import Takeoff
@@ -73,4 +74,6 @@ def test_a_mode_that_names_what_it_follows_follows_nothing_else() -> None:
 
 def test_a_vehicle_that_moves_has_moved_now() -> None:
     state = flying(Mode.LAND, moved_us=3)
-    assert moved(state, vehicle_at(PLACE, t_us=8)).vehicle == replace(state.vehicle, moved_us=8)
+    assert in_the_air(state, vehicle_at(PLACE, t_us=8)).vehicle == replace(
+        state.vehicle, moved_us=8
+    )

@@ -50,7 +50,9 @@ def received(
     heard = () if announced is None else (SafeSetAnnouncement(source, announced),)
     sensors = frame(round(1e6 * t_s))
     inputs = TickInputs(sensors, announced=heard, mission=lists)
-    return check.update(memory, inputs, vehicle_at(at), texts, flies=flies), texts
+    return check.update(
+        memory, inputs, vehicle_at(at), texts, flies=flies, armed=flies, target=None
+    ), texts
 
 
 def uploaded(
@@ -65,7 +67,9 @@ def uploaded(
     texts: list[StatusText] = []
     update = MissionUpdate(source=source, **lists)  # type: ignore[arg-type]
     inputs = TickInputs(frame(1_000_000), mission=update)
-    return check.update(memory, inputs, vehicle_at((0.0, 0.0, -1.0)), texts, flies=flies), texts
+    return check.update(
+        memory, inputs, vehicle_at((0.0, 0.0, -1.0)), texts, flies=flies, armed=flies, target=None
+    ), texts
 
 
 def refused(texts: list[StatusText]) -> str:
@@ -360,6 +364,7 @@ def announced_to(
     inputs = TickInputs(frame(t_us), announced=(SafeSetAnnouncement(STRANGER, safe_set),))
     estimate = vehicle_at((0.0, 0.0, -1.0), v, t_us)
     how = how or {"flies": True}
+    how = {"armed": how["flies"]} | how
     memory = memory or MissionMemory()
     return CHECK.update(memory, inputs, estimate, texts, target=target, **how), texts  # type: ignore[arg-type]
 

@@ -24,11 +24,13 @@ from fsw.autopilot.geometry.rotation import yaw_of
 from fsw.autopilot.model.airframe import AIRFRAME
 from fsw.autopilot.model.body import body_of
 from fsw.autopilot.model.parts import ON_BASE
+from fsw.autopilot.parameters.flight_config import flight_config
 from fsw.autopilot.shapes.ball import ball
 from fsw.autopilot.shapes.box import box
 from fsw.autopilot.shapes.half_space import wall
 from fsw.autopilot.shapes.target_sphere import target_sphere
 from fsw.autopilot.signals import SafeSet, StateEstimate, Vec3, Zone
+from fsw.autopilot.tuning import tuned
 from tests.fsw.paper_arm import LENGTHS
 from tests.fsw.random_states import mat3
 
@@ -40,8 +42,11 @@ STEP = 1.1e-3  # m, a little more than a step
 
 
 def clearance(body: str = "points", sigmas: float = 3.0) -> UncertainClearance:
-    of_name = body_of("full" if body == "full" else "points", AIRFRAME)
-    return UncertainClearance(sigmas, of_name, AIRFRAME.bodies, BARRIERS, 0.07)
+    walls, workspace = BARRIERS
+    config = flight_config(body=body)
+    planner = replace(config.planner, walls=walls, workspace=workspace)
+    config = replace(config, planner=planner)
+    return UncertainClearance(tuned(config, (("limits.clearance_sigmas", sigmas),)), 0.0)
 
 
 def vehicle(

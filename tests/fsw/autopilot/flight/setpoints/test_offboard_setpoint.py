@@ -10,12 +10,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from fsw.autopilot.flight.commands.bounds import motion_refusal
 from fsw.autopilot.flight.setpoints.offboard_setpoint import (
     Tilt,
     as_motion,
     attitude_refusal,
     joints_refusal,
-    motion_refusal,
     tilted,
 )
 from fsw.autopilot.model.airframe import AIRFRAME, GRAVITY
