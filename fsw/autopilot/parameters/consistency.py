@@ -73,14 +73,6 @@ class Accuracy:
     tilt: float  # rad
 
 
-@dataclass(frozen=True, slots=True)
-class EstimateReach:
-    """What an estimate that is not exact adds to the tube, and to clearances [m]."""
-
-    loop: float  # the base's way off its plan, besides the position's own error
-    clearance: float  # the position's error, by which clearances grow
-
-
 def analyse(config: FlightConfig, safe_set: SafeSet, loop: Tube) -> tuple[Finding, ...]:
     """Every finding about a controller with barriers in a safe set; there is none for the others.
 
@@ -175,9 +167,10 @@ def loop_tube(config: FlightConfig) -> Tube:
     return tube(config.airframe, config.tuning.tracking, *pushed)
 
 
-def estimate_reach(config: FlightConfig, accuracy: Accuracy) -> EstimateReach:
-    """How far an estimate of an accuracy leads the vehicle, at as many sigma as clearances grow by.
+def estimate_reach(config: FlightConfig, accuracy: Accuracy) -> float:
+    """How far [m] an estimate of an accuracy leads the base off its plan: what it adds to the tube.
 
+    At as many sigma as clearances grow by, besides the position's own error, by which these grow.
     Errors of position, velocity and tilt are bounded however they change; what the gyro's noise
     does is known by its spectrum.
     """
@@ -190,7 +183,7 @@ def estimate_reach(config: FlightConfig, accuracy: Accuracy) -> EstimateReach:
         + moved.acceleration * GRAVITY * accuracy.tilt
         + moved.jerk * noise
     )
-    return EstimateReach(sigmas * loop, sigmas * accuracy.position)
+    return sigmas * loop
 
 
 def estimate_findings(
@@ -216,10 +209,11 @@ def _estimate(
 ) -> Finding:
     reach, room = estimate_reach(config, accuracy), stand_off(tuning)
     sigmas = config.limits.clearance_sigmas or _SIGMAS
+    off = sigmas * accuracy.position
     pushed = base_reach(loop, config.surroundings.disturbance)
     # The sphere that follows the target has no room to spare: it is hardly made smaller.
     grows = config.limits.clearance_sigmas > 0.0 and not inside
-    needed = pushed + reach.loop + (0.0 if grows else reach.clearance)
+    needed = pushed + reach + (0.0 if grows else off)
     more = 1e3 * (needed - room)
     remedy = (
         f"lambda >= {needed * tuning.slope:.3f} m/s and a radius {more:.0f} mm larger"
@@ -231,10 +225,10 @@ def _estimate(
         "estimate",
         room - needed,
         f"estimate from {accuracy.source}, {sigmas:g} sigma: a place off by "
-        f"{1e3 * reach.clearance:.0f} mm, {place}; a velocity off by "
+        f"{1e3 * off:.0f} mm, {place}; a velocity off by "
         f"{1e3 * sigmas * accuracy.velocity:.0f} mm/s and a tilt off by "
         f"{1e3 * sigmas * accuracy.tilt:.1f} mrad, which move the base by "
-        f"{1e3 * reach.loop:.0f} mm at most; with the tube {1e3 * needed:.0f} mm of the "
+        f"{1e3 * reach:.0f} mm at most; with the tube {1e3 * needed:.0f} mm of the "
         f"{1e3 * room:.0f} mm that the plan keeps",
         f"{remedy} is enough",
         refuses=False,

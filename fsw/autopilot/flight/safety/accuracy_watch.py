@@ -80,5 +80,5 @@ class AccuracyWatch:
             StatusText(Severity.INFO if one.holds else Severity.WARNING, one.statement)
             for one in estimate_findings(self._config, safe_set, self._loop, accuracy)
         ]
-        reach = estimate_reach(self._config, accuracy).loop
+        reach = estimate_reach(self._config, accuracy)
         return AccuracyMemory(reach=reach if math.isfinite(reach) else 0.0, told=True)

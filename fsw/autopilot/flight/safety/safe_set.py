@@ -63,12 +63,13 @@ _ACCEPTED = 8  # sources whose last announcement is remembered
 
 
 class _Vehicle(NamedTuple):
-    """The vehicle for which another safe set is looked at."""
+    """The vehicle for which another safe set is looked at, and what its operator is told."""
 
     estimate: StateEstimate | None
     target: EndEffectorTarget | None  # that zones follow
     armed: bool
     flies: bool
+    texts: list[StatusText]
 
     @property
     def inside(self) -> StateEstimate | None:
@@ -106,14 +107,14 @@ class SafeSetCheck:
         A vehicle that is ``armed`` must be inside of it, with the zones that follow the ``target``
         if there is one. Of an upload all is taken or nothing.
         """
-        here = _Vehicle(estimate, target, armed, flies)
+        here = _Vehicle(estimate, target, armed, flies, texts)
         update = inputs.mission
         if update is not None:
             against = upload_problem(update) or self._against_rally(mission, update, armed=armed)
             if against is None:
-                mission = self._take_upload(mission, update, here, texts)
+                mission = self._take_upload(mission, update, here)
             else:
-                mission = _refused(mission, against, texts)
+                mission = _refused(mission, against, here)
         for announcement in inputs.announced:
             now_us = inputs.sensors.t_us
             owns = self._owns(mission, announcement.source, now_us, armed=armed)
@@ -122,11 +123,11 @@ class SafeSetCheck:
                 if owns and now_us != mission.owner_heard_us:
                     mission = replace(mission, owner_heard_us=now_us)
                 problem = "" if owns else self._against(mission, announcement.safe_set)
-            mission = self._take(mission, announcement, problem, here, texts, owns=owns)
+            mission = self._take(mission, announcement, problem, here, owns=owns)
         return mission
 
     def _take_upload(
-        self, mission: MissionMemory, update: MissionUpdate, here: _Vehicle, texts: list[StatusText]
+        self, mission: MissionMemory, update: MissionUpdate, here: _Vehicle
     ) -> MissionMemory:
         """What was uploaded, unless something speaks against any part of it."""
         wanted = mission
@@ -134,14 +135,14 @@ class SafeSetCheck:
             who = "fence" if update.source is None else f"fence of {update.source}"
             problem = self._against_fence(mission, update, here)
             if not problem:
-                wanted = self._with_fence(mission, update, who, here, texts)
+                wanted = self._with_fence(mission, update, who, here)
                 problem = "the old safe set is kept" if wanted is mission else ""
             if problem:
-                return _refused(mission, f"{who} refused: {problem}", texts)
+                return _refused(mission, f"{who} refused: {problem}", here)
         if update.rally not in (None, mission.rally):
             wanted = replace(wanted, rally=update.rally)
             text = f"rally points of {update.source}: {way_home.told(wanted.rally)}"
-            texts.append(StatusText(Severity.INFO, text))
+            here.texts.append(StatusText(Severity.INFO, text))
             if update.source is not None:
                 armed = here.inside is not None
                 wanted = way_home.changed(wanted, update.source.sender, armed=armed)
@@ -178,12 +179,7 @@ class SafeSetCheck:
         return self._outside(mission, mission.fence, fence, here)
 
     def _with_fence(
-        self,
-        mission: MissionMemory,
-        update: MissionUpdate,
-        who: str,
-        here: _Vehicle,
-        texts: list[StatusText],
+        self, mission: MissionMemory, update: MissionUpdate, who: str, here: _Vehicle
     ) -> MissionMemory:
         """The memory with a fence; the same one where both safe sets together cannot be kept."""
         fence, owner = update.fence or SafeSet(), mission.fence_owner
@@ -192,7 +188,7 @@ class SafeSetCheck:
         wanted = replace(mission, fence=fence, fence_owner=owner if fence.zones else None)
         if fence == mission.fence:
             return wanted
-        return self._kept(mission, wanted, f"{who}: {summary(fence)}", here, texts)
+        return self._kept(mission, wanted, f"{who}: {summary(fence)}", here)
 
     def _may_grow(self, mission: MissionMemory, update: MissionUpdate, here: _Vehicle) -> bool:
         """Whether an upload may put any other fence in place."""
@@ -205,7 +201,6 @@ class SafeSetCheck:
         announcement: SafeSetAnnouncement,
         against: str,
         here: _Vehicle,
-        texts: list[StatusText],
         *,
         owns: bool,
     ) -> MissionMemory:
@@ -221,7 +216,7 @@ class SafeSetCheck:
         refused = replace(mission, refused=announcement, refused_count=mission.refused_count + 1)
         if against:
             if not repeated:
-                texts.append(StatusText(Severity.CRITICAL, f"{who} refused: {against}"))
+                here.texts.append(StatusText(Severity.CRITICAL, f"{who} refused: {against}"))
             return refused
         if announcement == mission.refused and here.flies:
             return refused
@@ -236,7 +231,7 @@ class SafeSetCheck:
         change = f"{who}: {summary(safe_set)}"
         if becomes_owner:
             change += "; it owns the safe set now"
-        kept = self._kept(mission, wanted, change, here, texts)
+        kept = self._kept(mission, wanted, change, here)
         return refused if kept is mission else kept
 
     def _against(self, mission: MissionMemory, safe_set: SafeSet) -> str:
@@ -340,12 +335,7 @@ class SafeSetCheck:
         return self._config.limits.safe_set_owner
 
     def _kept(
-        self,
-        mission: MissionMemory,
-        wanted: MissionMemory,
-        change: str,
-        here: _Vehicle,
-        texts: list[StatusText],
+        self, mission: MissionMemory, wanted: MissionMemory, change: str, here: _Vehicle
     ) -> MissionMemory:
         """The memory with what is wanted; as it was where that cannot be kept in flight."""
         safe_set = joined(wanted.announced, wanted.fence)
@@ -363,16 +353,16 @@ class SafeSetCheck:
             ]
             refused = bool(against) and not self._config.soft and here.flies
             # What is taken on the ground all the same is told by a row of the failsafe table.
-            texts += (new if refused or self._config.soft else []) + weak
+            here.texts.extend((new if refused or self._config.soft else []) + weak)
             if refused:
                 if new or weak:
                     text = f"safe set refused: the old one is kept; wanted: {change}"
-                    texts.append(StatusText(Severity.WARNING, text))
+                    here.texts.append(StatusText(Severity.WARNING, text))
                 return mission
             if self._config.soft:
                 against = ()
         if not is_update(mission.safe_set, safe_set) or wanted.owner != mission.owner:
-            texts.append(StatusText(Severity.INFO, change))
+            here.texts.append(StatusText(Severity.INFO, change))
         return replace(wanted, safe_set=safe_set, refused=None, refusals=against)
 
     def hold_silent_zones(self, mission: MissionMemory, now_us: int) -> MissionMemory:
@@ -421,9 +411,9 @@ class SafeSetCheck:
         return replace(report, added=kept.added, shortfall=kept.shortfall) if kept.added else report
 
 
-def _refused(mission: MissionMemory, against: str, texts: list[StatusText]) -> MissionMemory:
+def _refused(mission: MissionMemory, against: str, here: _Vehicle) -> MissionMemory:
     """The memory without what was uploaded, and why."""
-    texts.append(StatusText(Severity.CRITICAL, against))
+    here.texts.append(StatusText(Severity.CRITICAL, against))
     return replace(mission, refused_count=mission.refused_count + 1, upload_taken=False)
 
 

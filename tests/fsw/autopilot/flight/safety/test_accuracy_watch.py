@@ -80,6 +80,6 @@ def test_what_the_estimate_adds_is_kept_for_the_watch_of_the_tube() -> None:
     memory = AccuracyMemory()
     for k in range(100):
         memory = WATCH.see(memory, 100_000 * k, WALLS, "pose", 0.001, covariance(0.01, 1e-3), [])
-    expected = estimate_reach(CONFIG, Accuracy("pose", 0.001, 0.01, 1e-3)).loop
+    expected = estimate_reach(CONFIG, Accuracy("pose", 0.001, 0.01, 1e-3))
     assert memory.told
     assert memory.reach == pytest.approx(expected)
