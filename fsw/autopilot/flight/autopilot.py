@@ -23,7 +23,6 @@ from fsw.autopilot.flight.commander import Commander
 from fsw.autopilot.flight.estimate.before_estimate import nothing_known, nowhere, told
 from fsw.autopilot.flight.estimate.exact_state import ExactState
 from fsw.autopilot.flight.estimate.jump import all_along
-from fsw.autopilot.flight.estimate.missed_ticks import resumed
 from fsw.autopilot.flight.estimate.sensed_state import CaughtUp, SensedState
 from fsw.autopilot.flight.fast_loop import FastLoop, loops_of
 from fsw.autopilot.flight.land_detector import with_range
@@ -35,6 +34,7 @@ from fsw.autopilot.flight.plan_exchange import (
     measured_state,
     nominal_at_rest,
     requested,
+    resumed,
     with_plan_state,
 )
 from fsw.autopilot.flight.restart import restarted

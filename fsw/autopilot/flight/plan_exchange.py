@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 
 from fsw.autopilot.control.braking import Brake
+from fsw.autopilot.control.joints import rest_joints
 from fsw.autopilot.flight.failsafe.evidence import PLAN_STALE_PERIODS
 from fsw.autopilot.flight.state import FlightState, PlanMemory
 from fsw.autopilot.geometry.rotation import wrap_angle
@@ -212,6 +213,26 @@ def without_plan(state: FlightState, estimate: StateEstimate) -> FlightState:
     plan = PlanMemory(since_us=estimate.t_us, next_id=last.next_id, counters=last.counters)
     record = with_plan_state(state.record, nominal_at_rest(estimate))
     return replace(state, record=record, plan=plan)
+
+
+def resumed(
+    config: FlightConfig, state: FlightState, estimate: StateEstimate, motion: MotionState
+) -> FlightState:
+    """The state after a time without ticks: no plan, to brake from the measured ``motion``.
+
+    Over few missed ticks the plan is moved on as if they had been there. Over more, nothing that
+    the loops remember says what happened: what moved the vehicle meanwhile was not their last
+    command, and an observer would take it for a disturbance. They go on from what they have
+    learned, but from no motion; of the disturbance its lasting part is kept, wind.
+    """
+    measured = measured_state(estimate, motion)
+    settled = with_arm_in_bounds(measured, config.airframe, config.planner.limits)
+    state = without_plan(state, estimate)
+    r = with_plan_state(state.record, settled)
+    r.observed.v[:] = estimate.v_WB
+    r.observed.d[:2], r.observed.d[2] = r.observed.disturbance_bias, 0.0
+    rest_joints(r.joints, config.airframe, estimate)
+    return replace(state, record=r)
 
 
 def with_plan_state(r: Tick, nominal: PredictionState) -> Tick:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from collections.abc import Iterator
+from typing import Final, NamedTuple
 
 from fsw.autopilot.control.cascade import in_hover
 from fsw.autopilot.estimation.correlated_error import correlated_error
@@ -14,6 +15,7 @@ from fsw.autopilot.estimation.faults.sample_rate import looked
 from fsw.autopilot.estimation.faults.sensor_fault import Health, SensorFault, sentence
 from fsw.autopilot.estimation.faults.sources import NOBODY, Source, names
 from fsw.autopilot.estimation.fusion_memory import FusionMemory, Reset, at_start
+from fsw.autopilot.estimation.imu import IMU_TOO_OLD
 from fsw.autopilot.estimation.sensor_fusion import FilterCall, SensorFusion
 from fsw.autopilot.estimation.tuning import EstimatorTuning
 from fsw.autopilot.estimation.turned_covariance import Vec6
@@ -24,7 +26,6 @@ from fsw.autopilot.flight.estimate.estimator_report import (
     unknown_report,
 )
 from fsw.autopilot.flight.estimate.jump import on_return, told
-from fsw.autopilot.flight.estimate.missed_ticks import missed_inputs
 from fsw.autopilot.flight.fast_loop import FastLoop
 from fsw.autopilot.flight.land_detector import is_aloft
 from fsw.autopilot.flight.state import Aiding, FlightState, LostSensor
@@ -34,6 +35,9 @@ from fsw.autopilot.signals import EstimatorReport, Severity, StateEstimate, Stat
 from fsw.autopilot.tick_record import Expected
 from fsw.frozen import replace
 
+# Since the last tick. The filter takes what is so old at once, and nothing that is older.
+READ_LATE_US: Final = round(1e6 * IMU_TOO_OLD)
+_STEP_US: Final = 4_000  # in which they are: the filter has room for more, but takes it for jitter
 _CHECKED_US = 100_000  # between checks for silent sensors
 _IMU = Sensor.IMU
 _EVERY_TICK = (_IMU, Sensor.ENCODERS)
@@ -257,6 +261,22 @@ class SensedState:
             silent = memory.now - came - self._stale
             if came >= 0.0 and 0.0 < silent <= 1e-6 * _CHECKED_US:
                 texts.append(StatusText(Severity.WARNING, sentence(sensor, SensorFault.STALE)))
+
+
+def missed_inputs(last_us: int, inputs: TickInputs) -> Iterator[TickInputs]:
+    """What ticks since ``last_us`` [us] would have been given, and at the end what is left.
+
+    Nothing but ``inputs`` themselves where few ticks were missed, or no sensor has measured.
+    """
+    now_us, samples = inputs.sensors.t_us, inputs.samples
+    if samples and now_us - last_us > READ_LATE_US:
+        for t_us in range(last_us + _STEP_US, now_us - _STEP_US, _STEP_US):
+            due = tuple([one for one in samples if one.time <= 1e-6 * t_us])
+            if due:
+                samples = tuple([one for one in samples if not one.time <= 1e-6 * t_us])
+                yield TickInputs(replace(inputs.sensors, t_us=t_us), samples=due)
+        inputs = replace(inputs, samples=samples)
+    yield inputs
 
 
 def _is_due(before: FusionMemory, inputs: TickInputs) -> bool:

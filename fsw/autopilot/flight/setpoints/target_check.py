@@ -44,8 +44,6 @@ class TargetCheck:
         self, targets: tuple[EndEffectorTarget, ...], safe_set: SafeSet, now_us: int
     ) -> tuple[tuple[EndEffectorTarget, ...], list[str]]:
         """Those of the ``targets`` that can be flown in a ``safe_set``, and why others cannot."""
-        if not targets:
-            return (), []
         against = [
             target_problem(one, now_us) or self._pressing_problem(one, safe_set) for one in targets
         ]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fsw.autopilot.flight.estimate.missed_ticks import READ_LATE_US, missed_inputs
+from fsw.autopilot.flight.estimate.sensed_state import READ_LATE_US, missed_inputs
 from fsw.autopilot.measurements import ImuSample
 from fsw.autopilot.signals import SensorFrame, TickInputs
 
