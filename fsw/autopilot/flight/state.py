@@ -8,7 +8,7 @@ from typing import Final, NamedTuple
 from fsw.autopilot.estimation.faults.sensor_fault import SensorFault, sentence
 from fsw.autopilot.estimation.frame_dropout import Dropout
 from fsw.autopilot.estimation.fusion_memory import FusionMemory
-from fsw.autopilot.flight.commands.dedup import AnsweredCommand
+from fsw.autopilot.flight.commands.dedup import Answers
 from fsw.autopilot.flight.failsafe.conditions import Condition, FailsafeMemory
 from fsw.autopilot.flight.mission.sequencer import MissionFlight
 from fsw.autopilot.flight.safety.accuracy_watch import AccuracyMemory
@@ -73,7 +73,7 @@ class VehicleMemory:
     failsafe: FailsafeMemory = FailsafeMemory()  # what is being done about them
     home: Home | None = None
     gcs_heard_us: int = -1  # when a ground station was last heard; -1: never
-    answered: tuple[AnsweredCommand, ...] = ()  # each sender's last command
+    answered: Answers = ()  # each sender's last command
     intended_mode: Mode = Mode.HOLD  # what arming leads to
     intended_us: int = 0  # when that was chosen
     failsafe_from: Mode | None = None  # what was flown when a failsafe took over

@@ -34,9 +34,11 @@ class AnsweredCommand:
     changed: frozenset[str] = frozenset()  # by it
 
 
-def answered_before(
-    memory: tuple[AnsweredCommand, ...], request: CommandRequest, t_us: int
-) -> AnsweredCommand | None:
+Answers = tuple[AnsweredCommand, ...]
+"""The last one to each sender."""
+
+
+def answered_before(memory: Answers, request: CommandRequest, t_us: int) -> AnsweredCommand | None:
     """The recent result of the same command of the same sender."""
     for last in memory:
         if last.sender == request.sender:
@@ -48,9 +50,7 @@ def answered_before(
     return None
 
 
-def still_true(
-    memory: tuple[AnsweredCommand, ...], changes: frozenset[str]
-) -> tuple[AnsweredCommand, ...]:
+def still_true(memory: Answers, changes: frozenset[str]) -> Answers:
     """The answers that stay true when a new command makes these ``changes``.
 
     A takeoff has still been done when somebody else has moved home: it must not be done again.
@@ -67,12 +67,12 @@ def still_true(
 
 
 def remember(
-    memory: tuple[AnsweredCommand, ...],
+    memory: Answers,
     request: CommandRequest,
     result: int,
     t_us: int,
     changed: frozenset[str] = frozenset(),
-) -> tuple[AnsweredCommand, ...]:
+) -> Answers:
     """The memory with this command, and what it ``changed``, as its sender's last."""
     sender = request.sender
     others = [last for last in memory if last.sender != sender]

@@ -88,6 +88,7 @@ class MissionContext:
     home_z: float  # m, NED, of home
     # Where the tool meets the surface at a place [m, NED], to press with a force [N].
     meet: Callable[[Vec3, float], Meeting]
+    limits: MotionLimits  # of a segment where the mission names no speed
     safe_set: SafeSet = field(default_factory=SafeSet)
     look_at: Vec3 | None = None  # m, where the nose is to point
 
@@ -106,6 +107,7 @@ class MissionEvent:
 
 
 NOTHING = MissionEvent()
+Advanced = tuple[MissionFlight, MissionEvent]
 
 
 def loaded(steps: tuple[MissionStep, ...], count: int = 0) -> MissionFlight:
@@ -184,18 +186,13 @@ def jumped(flight: MissionFlight, step: int, now_us: int, limits: MotionLimits) 
     return _braked(flight, progress, flight.segment.at(now_us), limits)
 
 
-def advance(
-    flight: MissionFlight, context: MissionContext, limits: MotionLimits
-) -> tuple[MissionFlight, MissionEvent]:
-    """One tick of a mission that has begun: at most one thing happens, in almost every tick none.
-
-    The limits are those of a segment where the mission names no speed.
-    """
+def advance(flight: MissionFlight, context: MissionContext) -> Advanced:
+    """One tick of a mission that has begun: at most one thing happens, and mostly none."""
     segment, now_us = flight.segment, context.now_us
     if segment is None:
         return flight, NOTHING
     if flight.stage is Stage.BEGIN:
-        return _begin(flight, segment.at(now_us), context, limits)
+        return _begin(flight, segment.at(now_us), context)
     if now_us < segment.end_us:
         return flight, NOTHING
     if flight.stage is Stage.BRAKE:
@@ -204,7 +201,7 @@ def advance(
         return replace(flight, stage=Stage.ARRIVE, since_us=now_us), NOTHING
     step = flight.steps[flight.progress.current]
     if flight.stage is Stage.ARRIVE:
-        return _arrive(flight, step, context, limits)
+        return _arrive(flight, step, context)
     if flight.stage is Stage.STAY and now_us - flight.since_us >= 1e6 * step.hold_s:
         return _hand_over(flight, step)
     return flight, NOTHING
@@ -217,16 +214,13 @@ def touched_down(flight: MissionFlight) -> MissionFlight:
     return replace(_reached(flight), stage=Stage.IDLE, segment=None)
 
 
-def _begin(
-    flight: MissionFlight, at: EndEffectorTarget, context: MissionContext, limits: MotionLimits
-) -> tuple[MissionFlight, MissionEvent]:
+def _begin(flight: MissionFlight, at: EndEffectorTarget, context: MissionContext) -> Advanced:
     number = flight.progress.current
     step = flight.steps[number]
     if step.action is MissionAction.JUMP:
         return _jump(flight, step)
     if step.action in MOVES_NOTHING:
         return _set(flight, number, step)
-    limits = _paced(flight, limits)
     place, towards, look_at = _destination(step, at, context), step.yaw, context.look_at
     if step.action is MissionAction.PUSH:
         met = context.meet(place, step.force)
@@ -236,7 +230,7 @@ def _begin(
         if towards is None and math.hypot(*met.normal[:2]) > _SIDEWAYS:
             towards = math.atan2(-met.normal[1], -met.normal[0])
     end = project_to_safe_set(place, context.safe_set, context.now_us)
-    segment = segment_to(at, end, _heading(towards, end, look_at), limits)
+    segment = segment_to(at, end, _heading(towards, end, look_at), _paced(flight, context))
     text = f"mission step {number}: {step.action.value}"
     moving = replace(
         flight, stage=Stage.MOVE, segment=segment, place=place, since_us=context.now_us
@@ -244,9 +238,7 @@ def _begin(
     return moving, MissionEvent(text=text)
 
 
-def _set(
-    flight: MissionFlight, number: int, step: MissionStep
-) -> tuple[MissionFlight, MissionEvent]:
+def _set(flight: MissionFlight, number: int, step: MissionStep) -> Advanced:
     """Do a step that moves nothing, and begin the next one."""
     if step.action is _SPEED:
         flight = replace(flight, speed=step.speed)
@@ -267,14 +259,14 @@ def _said(text: str, event: MissionEvent) -> MissionEvent:
     return replace(event, text="; ".join(filter(None, (text, event.text))))
 
 
-def _paced(flight: MissionFlight, limits: MotionLimits) -> MotionLimits:
+def _paced(flight: MissionFlight, context: MissionContext) -> MotionLimits:
     """The limits with the speed that the mission asked for."""
     if flight.speed is None:
-        return limits
-    return replace(limits, speed=min(flight.speed, MAX_MISSION_SPEED))
+        return context.limits
+    return replace(context.limits, speed=min(flight.speed, MAX_MISSION_SPEED))
 
 
-def _jump(flight: MissionFlight, step: MissionStep) -> tuple[MissionFlight, MissionEvent]:
+def _jump(flight: MissionFlight, step: MissionStep) -> Advanced:
     """Go on with another step, until that was done as often as the mission says."""
     number = flight.progress.current
     taken = flight.jumps.count(number)
@@ -315,16 +307,14 @@ def _destination(step: MissionStep, at: EndEffectorTarget, context: MissionConte
     return x, y, z
 
 
-def _arrive(
-    flight: MissionFlight, step: MissionStep, context: MissionContext, limits: MotionLimits
-) -> tuple[MissionFlight, MissionEvent]:
+def _arrive(flight: MissionFlight, step: MissionStep, context: MissionContext) -> Advanced:
     place = flight.place
     off = 0.0 if step.position is None or place is None else math.dist(context.p_WE, place)
     if off <= step.acceptance:
         if step.action is MissionAction.CIRCLE and not isinstance(flight.segment, CircleSegment):
-            return _circle(flight, step, context, limits), NOTHING
+            return _circle(flight, step, context), NOTHING
         if step.action is MissionAction.PUSH and not isinstance(flight.segment, PushSegment):
-            return _push(flight, step, context, limits)
+            return _push(flight, step, context)
         return replace(flight, stage=Stage.STAY, since_us=context.now_us), NOTHING
     if context.now_us - flight.since_us < ARRIVAL_TIMEOUT_US:
         return flight, NOTHING
@@ -332,28 +322,24 @@ def _arrive(
     return _given_up(flight, text)
 
 
-def _given_up(flight: MissionFlight, text: str) -> tuple[MissionFlight, MissionEvent]:
+def _given_up(flight: MissionFlight, text: str) -> Advanced:
     """Go on with the next step, and say why the current one was not done."""
     following, event = _next(flight)
     return following, replace(event, text=text, unmet=True)
 
 
-def _push(
-    flight: MissionFlight, step: MissionStep, context: MissionContext, limits: MotionLimits
-) -> tuple[MissionFlight, MissionEvent]:
+def _push(flight: MissionFlight, step: MissionStep, context: MissionContext) -> Advanced:
     """From the stand-off to the surface, where it is by now, a force on it, and back."""
     assert flight.segment is not None
     at = flight.segment.at(context.now_us)
     met = context.meet(at.p_WE, step.force)
     if met.against:
         return _given_up(flight, f"mission step {flight.progress.current} not flown: {met.against}")
-    push = push_from(at, met.place, step.force, step.press_s, _paced(flight, limits))
+    push = push_from(at, met.place, step.force, step.press_s, _paced(flight, context))
     return replace(flight, stage=Stage.MOVE, segment=push, since_us=context.now_us), NOTHING
 
 
-def _circle(
-    flight: MissionFlight, step: MissionStep, context: MissionContext, limits: MotionLimits
-) -> MissionFlight:
+def _circle(flight: MissionFlight, step: MissionStep, context: MissionContext) -> MissionFlight:
     """The circle itself, from the end of the way to it."""
     assert flight.segment is not None
     assert step.position is not None
@@ -363,13 +349,13 @@ def _circle(
         x, y = at.p_WE[0] - abs(step.radius), at.p_WE[1]
     centre = (x, y, at.p_WE[2])
     circle = circle_from(
-        at, centre, step.radius, step.turns, context.look_at, _paced(flight, limits)
+        at, centre, step.radius, step.turns, context.look_at, _paced(flight, context)
     )
     end = circle.at(circle.end_us).p_WE
     return replace(flight, stage=Stage.MOVE, segment=circle, place=end, since_us=context.now_us)
 
 
-def _hand_over(flight: MissionFlight, step: MissionStep) -> tuple[MissionFlight, MissionEvent]:
+def _hand_over(flight: MissionFlight, step: MissionStep) -> Advanced:
     """Complete the step: continue with the next one or switch to its mode."""
     if step.action is MissionAction.LAND:
         return replace(flight, stage=Stage.GONE), MissionEvent(Mode.LAND, "land")
@@ -387,9 +373,7 @@ def _reached(flight: MissionFlight, *, over: bool = True) -> MissionFlight:
     return replace(flight, progress=progress)
 
 
-def _next(
-    flight: MissionFlight, following: int | None = None
-) -> tuple[MissionFlight, MissionEvent]:
+def _next(flight: MissionFlight, following: int | None = None) -> Advanced:
     """Go on with the step that follows, by default the next one."""
     now = flight.progress
     following = now.current + 1 if following is None else following

@@ -79,11 +79,12 @@ class Mission(FlightMode):
             p_WE=end_effector(config.airframe.bodies, estimate)[0],
             height=-estimate.p_WB[2],
             home_z=home_z,
+            limits=motion_limits(config),
             safe_set=state.kept.safe_set,
             look_at=vehicle.look_at,
             meet=lambda p, force: self._targets.meet(p, force, state.kept.source, estimate.t_us),
         )
-        flown, event = sequencer.advance(flight, context, motion_limits(config))
+        flown, event = sequencer.advance(flight, context)
         if flown is flight:
             return state, CONTINUE
         if event.looks:

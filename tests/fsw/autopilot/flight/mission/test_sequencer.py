@@ -87,11 +87,12 @@ class Flown:
                 self.height,
                 self.home_z,
                 self.meet,
+                PACE,
                 self.safe_set,
                 self.look_at,
             )
             count = self.flight.progress.reached_count
-            self.flight, event = advance(self.flight, where, PACE)
+            self.flight, event = advance(self.flight, where)
             if self.flight.progress.reached_count > count:
                 self.reached.append(self.flight.progress.reached)
             self.next_mode = event.next_mode
@@ -329,10 +330,10 @@ def test_a_text_about_a_speed_does_not_hide_that_the_mission_is_complete() -> No
 
 def arrival(look_at: Vec3 | None, end: Vec3, yaw: float | None = None) -> EndEffectorTarget:
     """The end of a way to a place while the nose points at another."""
-    around = MissionContext(0, START.p_WE, 1.3, 0.0, nothing_there, look_at=look_at)
+    around = MissionContext(0, START.p_WE, 1.3, 0.0, nothing_there, PACE, look_at=look_at)
     flight = begun(loaded((go(*end, yaw=yaw),)), START, PACE)
     for _ in range(2):
-        flight, _ = advance(flight, around, PACE)
+        flight, _ = advance(flight, around)
     assert flight.segment is not None
     return flight.segment.at(flight.segment.end_us)
 
@@ -360,14 +361,14 @@ def test_above_what_is_looked_at_or_without_it_the_step_says_the_heading(
 
 
 def test_what_is_looked_at_is_left_alone_by_other_steps() -> None:
-    around = MissionContext(0, START.p_WE, 1.3, 0.0, nothing_there)
+    around = MissionContext(0, START.p_WE, 1.3, 0.0, nothing_there, PACE)
     flight = begun(loaded((go(1.0, 0.0, -1.0), MissionStep(A.LOOK_AT))), START, PACE)
     for _ in range(2):
-        flight, event = advance(flight, around, PACE)
+        flight, event = advance(flight, around)
         assert not event.looks
     flight = begun(jumped(flight, 1, 0, PACE), START, PACE)
     for _ in range(2):
-        flight, event = advance(flight, around, PACE)
+        flight, event = advance(flight, around)
     assert (event.looks, event.look_at) == (True, None)
 
 
@@ -379,8 +380,10 @@ def test_a_place_is_waited_for_as_long_as_it_says(late_us: int, gives_up: bool) 
     flown.blocked = lambda _: START.p_WE
     while flown.flight.stage is not Stage.ARRIVE:
         flown.fly(STEP_US * 1e-6)
-    around = MissionContext(flown.flight.since_us + late_us, START.p_WE, 1.3, 0.0, nothing_there)
-    following, event = advance(flown.flight, around, PACE)
+    around = MissionContext(
+        flown.flight.since_us + late_us, START.p_WE, 1.3, 0.0, nothing_there, PACE
+    )
+    following, event = advance(flown.flight, around)
     assert (following.progress.current == 1) is gives_up
     assert event.unmet is gives_up
 
@@ -399,13 +402,13 @@ def test_a_stay_lasts_as_long_as_the_step_says() -> None:
         flown.fly(STEP_US * 1e-6)
     begin = flown.flight.since_us
     for later_us, done in ((1_999_999, False), (2_000_000, True)):
-        context = MissionContext(begin + later_us, START.p_WE, 1.3, 0.0, nothing_there)
-        assert (advance(flown.flight, context, PACE)[0].progress.current == 1) is done
+        context = MissionContext(begin + later_us, START.p_WE, 1.3, 0.0, nothing_there, PACE)
+        assert (advance(flown.flight, context)[0].progress.current == 1) is done
 
 
 def test_a_mission_that_is_not_flown_does_nothing() -> None:
     still = loaded((go(1.0, 0.0, -1.0),))
-    flight, event = advance(still, MissionContext(0, REST, 1.0, 0.0, nothing_there), PACE)
+    flight, event = advance(still, MissionContext(0, REST, 1.0, 0.0, nothing_there, PACE))
     assert flight is still
     assert (event.next_mode, event.text, event.unmet, event.looks) == (None, "", False, False)
 
