@@ -135,16 +135,15 @@ class Autopilot:
         self._sensed = SensedState(config.estimator, self._fast)
         self._exact = ExactState(self._fast)
         self._descent = Descent(config)
-        limits = config.limits
-        reallocates = bool(limits.failed_rotor_mode)
-        self._damage = DamageWatch(config.airframe, config.tick, reallocates=reallocates)
-        self._watches = bool(limits.watches_actuators)
+        self._damage = DamageWatch(config)
+        self._watches = bool(config.limits.watches_actuators)
         self.calm = CalmTick(
             *(config, self._fast, self._damage, self._watch, self._sensed, self.zones_now)
         )
         self._accuracy = AccuracyWatch(config, self._safe_sets.loop_tube)
         self._clearance = UncertainClearance(config, self._cascade.law.filter.lag)
         self._room = ZoneRoom(config)
+        limits = config.limits
         low, critical = limits.battery_low, limits.battery_critical
         self._battery_levels = low, critical, limits.battery_emergency
         self._tick_us = config.tick_period_us
@@ -164,9 +163,8 @@ class Autopilot:
         self._horizon.warm_up(estimate)
         self._sensed.warm_up()
         self._clearance.warm_up(estimate)
-        bodies = self.config.airframe.bodies
-        end_effector(bodies, estimate)
-        retreat_place(SafeSet(()), estimate, self.config.body, bodies, 0.0)
+        end_effector(self.config.airframe.bodies, estimate)
+        retreat_place(self.config, SafeSet(()), estimate, 0.0)
 
     def analyse(self, safe_set: SafeSet) -> tuple[Finding, ...]:
         """Findings on whether this configuration can keep a safe set."""

@@ -50,6 +50,7 @@ class CalmTick:
     ) -> None:
         """Of the laws that whole ticks of this configuration have."""
         self._config, self._tick_us = config, config.tick_period_us
+        self._is_above_px4 = config.is_above_px4
         self._per_plan = config.ticks_per_plan
         self._fast, self._damage = fast, damage
         self._watch, self._sensed, self._zones_now = watch, sensed, zones_now
@@ -74,7 +75,7 @@ class CalmTick:
                 return None
             exact = self.step(before, reading_of(frame), now_us)
             return None if exact is None else (exact, None)
-        if self._config.is_above_px4 or any(map(_is_range, inputs.samples)):
+        if self._is_above_px4 or any(map(_is_range, inputs.samples)):
             return None  # the land detector looks at a range
         r = before.copy()
         run = self._fast.calm(r, self._watch.upright, self._zones, self._tube)

@@ -63,7 +63,6 @@ class Commander:
         loop = loop_tube(config)
         self._tube_radius = base_reach(loop, config.surroundings.disturbance)
         self._heaviest = payload_range(config, loop).most
-        self._body = config.body
         self._generator = SetpointGenerator(config)
         self._horizon = ReferenceHorizon(config)
         self._modes: dict[Mode, FlightMode] = {mode: kind(config) for mode, kind in MODES.items()}
@@ -176,11 +175,11 @@ class Commander:
         """
         config = self._config
         room = stand_off(config.planner.walls) + self._tube_radius
-        safe_set = within_room(state.kept.safe_set, estimate, self._body)
+        safe_set = within_room(config, state.kept.safe_set, estimate)
         if safe_set.touchable:  # a moving surface needs more room
             room += _AWAY + max(state.record.pressing.moved, 0.0)
-        place = retreat_place(safe_set, estimate, self._body, config.airframe.bodies, room)
-        home = self._config.airframe.home if safe_set.touchable else None  # the arm has given way
+        place = retreat_place(config, safe_set, estimate, room)
+        home = config.airframe.home if safe_set.touchable else None  # the arm has given way
         return self._towards(state, PositionGoal(MotionSetpoint(False, place), home), estimate)
 
     def check_mode_completion(

@@ -67,8 +67,6 @@ class Descend(FlightMode):
 
     def __init__(self, config: FlightConfig) -> None:
         super().__init__(config)
-        self._body = config.body
-        self._bodies = config.airframe.bodies
         self._room = stand_off(config.planner.walls)
 
     def update(self, state: FlightState, estimate: StateEstimate) -> tuple[FlightState, ModeResult]:
@@ -84,7 +82,7 @@ class Descend(FlightMode):
         if not (is_hurried(state.aiding, limits.aiding_loss_us) and safe_set.zones):
             known = state.setpoint.goal is None
             return state if known else replace(state, setpoint=SetpointMemory())
-        place = retreat_place(safe_set, estimate, self._body, self._bodies, self._room)
+        place = retreat_place(self.config, safe_set, estimate, self._room)
         goal = PositionGoal(MotionSetpoint(False, place))
         return replace(state, setpoint=SetpointMemory(goal=goal))
 

@@ -17,8 +17,9 @@ from fsw.autopilot.estimation.fusion_memory import FusionMemory
 from fsw.autopilot.flight.state import Damage
 from fsw.autopilot.measurements import Sensor
 from fsw.autopilot.model.actuator_health import HEALTHY, LIMP, SOUND, STUCK, ActuatorHealth
-from fsw.autopilot.model.airframe import GRAVITY, Airframe
+from fsw.autopilot.model.airframe import GRAVITY
 from fsw.autopilot.model.rotors import rotor_decay, rotor_names
+from fsw.autopilot.parameters.flight_config import FlightConfig
 from fsw.autopilot.signals import ActuatorReport, JointVector
 from fsw.autopilot.tick_record import NO_ROTOR, Tick, Watched
 from fsw.compiled import machine_code, packed
@@ -31,15 +32,15 @@ _MIN_GIVEN: Final = 0.1  # N, of a rotor that does not obey
 class DamageWatch:
     """The watch over the actuators of one configuration."""
 
-    def __init__(self, airframe: Airframe, tick: float, *, reallocates: bool) -> None:
-        """Watch in ticks of ``tick`` [s]; loops reckon with what is found if it ``reallocates``."""
+    def __init__(self, config: FlightConfig) -> None:
+        airframe, tick = config.airframe, config.tick
         law = watch_law(airframe)
         self._law, self._spares = packed(law), law.spares
         self._tops, self._names = airframe.rotor_thrust_max, rotor_names(airframe)
         self._hover = airframe.mass * GRAVITY / airframe.rotors
         self._tick = tick
         self._decay = rotor_decay(airframe, tick)
-        self._reallocates = reallocates
+        self._reallocates = bool(config.limits.failed_rotor_mode)  # loops reckon with what is found
         self._postures = [
             balancing_posture(airframe, k) if law.spares[k] > 0.0 else None
             for k in range(airframe.rotors)

@@ -5,10 +5,10 @@ from __future__ import annotations
 from itertools import product
 
 from fsw.autopilot.geometry.vectors import add_scaled
-from fsw.autopilot.model.body import Body, hull_reach
+from fsw.autopilot.model.body import hull_reach
 from fsw.autopilot.model.kinematics import frame_of, position
-from fsw.autopilot.model.multibody import Bodies
 from fsw.autopilot.model.parts import ON_BASE
+from fsw.autopilot.parameters.flight_config import FlightConfig
 from fsw.autopilot.shapes.zones import surfaces
 from fsw.autopilot.signals import SafeSet, StateEstimate, Vec3
 
@@ -19,14 +19,14 @@ _FARTHEST = 1.0
 
 
 def retreat_place(
-    safe_set: SafeSet, estimate: StateEstimate, body: Body, bodies: Bodies, room: float
+    config: FlightConfig, safe_set: SafeSet, estimate: StateEstimate, room: float
 ) -> Vec3:
     """A place for the base [m, NED] from which no zone is closer than ``room`` [m].
 
-    The arm of a vehicle of ``bodies`` keeps its pose. A sphere that follows the target comes along
+    The arm keeps its pose. A sphere that follows the target comes along
     and is left out. Between zones that leave no such place it is one in their middle.
     """
-    frame = frame_of(bodies, estimate)
+    frame, body = frame_of(config.airframe.bodies, estimate), config.body
     places: list[tuple[Vec3, float | None]] = [(estimate.p_WB, None)]  # None: the base's hull
     places += [
         (position(frame, part.on, part.begin), part.radius)

@@ -24,7 +24,7 @@ from fsw.autopilot.control.safety_filter import ROOM
 from fsw.autopilot.flight.safety.safe_set_change import held
 from fsw.autopilot.flight.safety.uncertain_clearance import InflatedSafeSet
 from fsw.autopilot.geometry.vectors import clamp, dot
-from fsw.autopilot.model.body import Body, hull_reach
+from fsw.autopilot.model.body import hull_reach
 from fsw.autopilot.parameters.flight_config import FlightConfig, lowest_height
 from fsw.autopilot.shapes import kind_of
 from fsw.autopilot.shapes.zones import surface
@@ -127,9 +127,9 @@ def _slowed(zone: Zone, share: float, now_us: int) -> Zone:
     return replace(held(zone, now_us - zone.t_us), velocity=velocity, t_us=now_us)
 
 
-def within_room(safe_set: SafeSet, estimate: StateEstimate, body: Body) -> SafeSet:
-    """The zones that a vehicle with a ``body`` may draw back from."""
-    zones = []
+def within_room(config: FlightConfig, safe_set: SafeSet, estimate: StateEstimate) -> SafeSet:
+    """The zones that a vehicle may draw back from."""
+    zones, body = [], config.body
     for k, zone in enumerate(safe_set.zones):
         at = surface(safe_set, k, estimate.p_WB, estimate.t_us)
         if at is not None and at.distance - hull_reach(body, at.normal) > -ROOM:

@@ -27,6 +27,7 @@ from fsw.autopilot.model.actuator_health import HEALTHY
 from fsw.autopilot.model.airframe import AIRFRAME, AttitudeLag
 from fsw.autopilot.model.nominal import NominalModel, move_plan
 from fsw.autopilot.model.rotors import rotor_decay
+from fsw.autopilot.parameters.flight_config import FlightConfig
 from fsw.autopilot.shapes.ball import point
 from fsw.autopilot.shapes.half_space import wall
 from fsw.autopilot.shapes.zones import moving_zones
@@ -160,7 +161,7 @@ def test_the_estimate_is_the_one_of_python() -> None:
 
 def test_the_watch_over_actuators_is_the_one_of_python() -> None:
     random = np.random.default_rng(11)
-    watcher = DamageWatch(AIRFRAME, 0.002, reallocates=True)
+    watcher = DamageWatch(FlightConfig())
     in_python, law = getattr(watch, "py_func", watch), watch_law(AIRFRAME)
     ours = memory(random)
     plain, found = ours.copy(), 0

@@ -15,8 +15,10 @@ from fsw.autopilot.flight.safety.damage_watch import DamageWatch
 from fsw.autopilot.flight.state import Damage
 from fsw.autopilot.model.actuator_health import HEALTHY, LIMP, SOUND, STUCK
 from fsw.autopilot.model.airframe import AIRFRAME
+from fsw.autopilot.parameters.flight_config import FlightConfig
 from fsw.autopilot.signals import ActuatorCommand, StateEstimate
 from fsw.autopilot.tick_record import Tick, new_tick
+from tests.fsw.autopilot.flight.in_flight import limits
 from tests.fsw.records import changed
 
 DT = 0.002
@@ -26,7 +28,7 @@ LEVEL = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 HANGING = (0.0, 0.0)
 
 Given = Callable[[float, int], float]  # thrust over command of a rotor (0 to 3) at a time [s]
-WATCHER = DamageWatch(AIRFRAME, DT, reallocates=True)
+WATCHER = DamageWatch(FlightConfig())
 
 
 def estimate(t_s: float, rate: tuple[float, float, float], specific_force: float) -> StateEstimate:
@@ -347,7 +349,7 @@ def test_a_joint_that_does_not_yield_to_a_surface_stands(
 
 
 def test_allocation_is_left_alone_where_that_is_asked_for() -> None:
-    ignoring = DamageWatch(AIRFRAME, DT, reallocates=False)
+    ignoring = DamageWatch(limits(failed_rotor_mode=0))
     damage = Motion(weak(1, 0.6), ignoring).run(FAULT_S + 0.6)
     assert damage.rotor
     assert damage.health is HEALTHY

@@ -15,7 +15,6 @@ from fsw.autopilot.flight.safety.safe_set import SafeSetCheck
 from fsw.autopilot.flight.safety.safety_watch import SafetyWatch
 from fsw.autopilot.flight.safety.uncertain_clearance import InflatedSafeSet
 from fsw.autopilot.flight.state import first_state
-from fsw.autopilot.model.body import body_of
 from fsw.autopilot.shapes.ball import ball
 from fsw.autopilot.shapes.box import box
 from fsw.autopilot.shapes.half_space import wall
@@ -23,15 +22,13 @@ from fsw.autopilot.shapes.target_sphere import target_sphere
 from fsw.autopilot.signals import SafeSet, Vec2, Vec3, Zone
 from tests.fsw.autopilot.flight.in_flight import CONFIG, vehicle_at
 
-BODIES = CONFIG.airframe.bodies
-POINTS = body_of("points", CONFIG.airframe)
 CHECK = SafeSetCheck(replace(CONFIG, planner=replace(CONFIG.planner, body="points")))
 ROOM = stand_off(CONFIG.planner.walls)
 AHEAD = wall((-1.0, 0.0, 0.0), -1.0, 0.1)
 
 
 def retreated(zones: tuple[Zone, ...], p: Vec3, q_arm: Vec2 = (0.0, 0.0)) -> Vec3:
-    return retreat_place(SafeSet(zones), vehicle_at(p)._replace(q_arm=q_arm), POINTS, BODIES, ROOM)
+    return retreat_place(CONFIG, SafeSet(zones), vehicle_at(p)._replace(q_arm=q_arm), ROOM)
 
 
 @pytest.mark.requirement("REQ-SAFE-4")
