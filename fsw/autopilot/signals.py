@@ -695,7 +695,7 @@ class PlanFailure:
 
     plan_id: int
     status: SolverStatus
-    reason: str
+    reason: str  # where the status does not say it
     timings: PlanTimings
 
 

@@ -113,7 +113,12 @@ def take_answer(
             return taken, answer
         counters = replace(counters, fallbacks=counters.fallbacks + 1)
         refused = replace(
-            memory, awaited_id=-1, status=answer.status, refused=True, counters=counters
+            memory,
+            awaited_id=-1,
+            status=answer.status,
+            refused=True,
+            reason=answer.reason,
+            counters=counters,
         )
         return refused, None
     if now_us >= memory.awaited_us and not memory.awaited_missed:

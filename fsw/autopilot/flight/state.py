@@ -171,6 +171,7 @@ class PlanMemory:
     next_id: int = 0
     status: SolverStatus = SolverStatus.UNKNOWN
     refused: bool = False
+    reason: str = ""  # why, where the status does not say it
     counters: PlannerCounters = field(default_factory=PlannerCounters)
 
 

@@ -112,10 +112,8 @@ class Planner:
         search = SOLVERS[self._config.solver](asked, self._config, self._stopwatch_us)
         solution = search.solution
         if not solution.usable:
-            after = f"after {search.solver_iterations} iterations"
-            reason = f"solver stopped with {solution.status.name} {after}"
             timings = _timings(search, self._stopwatch_us() - begin)
-            return PlanFailure(request.plan_id, solution.status, reason, timings)
+            return PlanFailure(request.plan_id, solution.status, "", timings)
         inputs = solution.x[: len(self._inputs)]
         self._inputs = inputs
         self._t_us = request.t_apply_us

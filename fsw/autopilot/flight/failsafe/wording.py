@@ -14,7 +14,7 @@ from fsw.autopilot.flight.failsafe.evidence import (
     way_home_s,
 )
 from fsw.autopilot.flight.situation import Situation
-from fsw.autopilot.flight.state import is_young
+from fsw.autopilot.flight.state import PlanMemory, is_young
 from fsw.autopilot.signals import SolverStatus
 
 
@@ -74,7 +74,7 @@ def no_plan(context: Situation) -> str:
     """What the planner does instead of planning, and since when."""
     plan = context.state.plan
     why = "silent" if plan.awaited_missed or not plan.refused else ""
-    why = why or _PLANNER_FAILS.get(plan.status, "failing")
+    why = why or _planner_fails(plan)
     return f": planner {why}, last plan {1e-6 * plan_age_us(context):.2f} s ago"
 
 
@@ -88,7 +88,12 @@ def refused_setpoints(context: Situation) -> str:
 
 def refused_plan(context: Situation) -> str:
     """Without a number: it may come and go ten times a second, and is then told once in a while."""
-    return f": {_PLANNER_FAILS.get(context.state.plan.status, 'failing')}"
+    return f": {_planner_fails(context.state.plan)}"
+
+
+def _planner_fails(plan: PlanMemory) -> str:
+    why = _PLANNER_FAILS.get(plan.status, "failing")
+    return f"{why}, {plan.reason}" if plan.reason else why
 
 
 def jumped(context: Situation) -> str:

@@ -133,7 +133,7 @@ def test_a_refusal_is_counted_and_the_running_plan_goes_on() -> None:
     )
     assert new is None
     assert memory.running is running
-    assert memory.refused
+    assert (memory.refused, memory.reason) == (True, REFUSAL.reason)
     assert memory.counters.fallbacks == 1
 
 

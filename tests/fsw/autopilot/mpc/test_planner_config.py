@@ -32,7 +32,7 @@ PARTS = {
     "planner.soft": SoftWeights(),
     "planner": PlannerConfig(),
 }
-ROW = re.compile(r"^- `(\w+)` = (?:INT32 )?(\S+) ?(.*?) \([^)]*…", re.MULTILINE)
+ROW = re.compile(r"^- `(\w+)`(?: †)? = (?:INT32 )?(\S+) ?(.*?) \([^)]*…", re.MULTILINE)
 
 
 @pytest.mark.parametrize("part", PARTS)

@@ -517,6 +517,10 @@ def test_a_report_names_the_condition_its_number_and_what_is_done() -> None:
         (PlanMemory(awaited_missed=True), "planner silent, last plan 0.40 s ago"),
         (PlanMemory(status=SolverStatus.INFEASIBLE), "planner infeasible, last plan 0.40 s ago"),
         (PlanMemory(status=SolverStatus.TIME_LIMIT), "planner out of time, last plan 0.40 s ago"),
+        (
+            PlanMemory(status=SolverStatus.INPUT_REFUSED, reason="a target is not finite"),
+            "planner input refused, a target is not finite, last plan 0.40 s ago",
+        ),
     ],
 )
 def test_a_planner_that_does_not_plan_is_told_with_why_and_since_when(
