@@ -45,7 +45,7 @@ class FailsFrom:
         if request.plan_id < self._first_failure:
             return self._planner.plan(request)
         nothing = PlanTimings(0.0, 0.0, 0.0)
-        return PlanFailure(request.plan_id, SolverStatus.INFEASIBLE, "as told", nothing)
+        return PlanFailure(request.plan_id, SolverStatus.INFEASIBLE, "", nothing)
 
 
 @pytest.mark.requirement("REQ-PLAN-1")
