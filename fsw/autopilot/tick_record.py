@@ -176,6 +176,7 @@ class Watched(Record):
     """What the watch over the actuators knows (``fsw/autopilot/control/actuator_watch.py``)."""
 
     running: float  # s, since it began
+    aloft: int  # the vehicle flies so high that no ground carries it
     thrust: PerRotor  # N, of rotors that give what is commanded
     rate: Three  # rad/s, of the last tick
     torque: Two  # N m about x and y, observed beside the model

@@ -48,6 +48,7 @@ def test_a_weak_rotor_is_named_once_and_the_vehicle_lands_with_it() -> None:
     estimate = flight.state.estimate
     assert estimate is not None
     assert math.degrees(math.acos(estimate.R_WB[8])) < 5.0
+    assert flight.state.record.watch.aloft
     # The loops know what the rotor gives: they believe in the thrust that there is.
     assert flight.state.record.rotors[1] == pytest.approx(flight.state.record.rotors[3], abs=0.5)
     sent = flight.sent[-1].rotor_thrust

@@ -56,7 +56,7 @@ LEARNING: Final = 2.0  # s, of what lasts along z
 LEARNING_BELOW: Final = 1.0  # N of a rotor about roll and pitch
 SETTLING: Final = 1.0  # s, before anything is found
 AIRBORNE: Final = 0.5  # of the weight; with less thrust nothing is found
-CONTACT: Final = 3.0  # m/s^2 more than the rotors give: the ground carries
+CONTACT: Final = 3.0  # m/s^2 more than the rotors give: near the ground, it carries
 # Healthy flights in all suites, in real air, with another mass, lag, inertia or friction, have
 # less, or not for so long (docs/decisions/0033-actuators-that-fail.md).
 WEAK: Final = 1.5  # N, root mean square
@@ -196,7 +196,8 @@ def watch(
     else:
         _forget_arm(s)
     force, _ = rotor_wrench(airframe, s.thrust)
-    if not -force[2] > AIRBORNE * airframe.mass * GRAVITY or s.lift > CONTACT * airframe.mass:
+    carried = s.lift > CONTACT * airframe.mass and not s.aloft
+    if carried or not -force[2] > AIRBORNE * airframe.mass * GRAVITY:
         s.running = 0.0  # on the ground, or about to be
     s.running += dt
     settled = s.running > SETTLING

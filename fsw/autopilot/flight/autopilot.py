@@ -25,7 +25,7 @@ from fsw.autopilot.flight.estimate.exact_state import ExactState
 from fsw.autopilot.flight.estimate.jump import all_along
 from fsw.autopilot.flight.estimate.sensed_state import CaughtUp, SensedState
 from fsw.autopilot.flight.fast_loop import FastLoop, loops_of
-from fsw.autopilot.flight.land_detector import with_range
+from fsw.autopilot.flight.land_detector import is_aloft, with_range
 from fsw.autopilot.flight.modes.descend import Descent, forget_wind
 from fsw.autopilot.flight.modes.mission import with_update
 from fsw.autopilot.flight.modes.offboard import accept_setpoints
@@ -634,6 +634,8 @@ class Autopilot:
         if not watches or self._jumped(state, controlled.inputs.sensors.t_us):
             pause(r.watch)
             return state.damage
+        now, legs = 1e-6 * controlled.inputs.sensors.t_us, self.config.airframe.leg_length
+        r.watch.aloft = is_aloft(state, now, legs)
         return self._damage.see(
             state.damage,
             state.record,

@@ -134,7 +134,7 @@ def _has_fault(state: FlightState, now: float, kind: SensorFault) -> bool:
     return health.fault is kind and now - health.fault_at < _RANGE_AGE
 
 
-def is_aloft(state: FlightState, now: float, legs: float, oldest: float) -> bool:
+def is_aloft(state: FlightState, now: float, legs: float, oldest: float = _RANGE_AGE) -> bool:
     """Whether the vehicle flies so high at ``now`` [s] that its ``legs`` [m] cannot touch anything.
 
     By the rangefinder's reading, if that is not ``oldest`` [s], or by the estimate, as far as it

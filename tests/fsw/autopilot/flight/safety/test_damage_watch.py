@@ -49,10 +49,12 @@ class Motion:
         takeoff_s: float = 0.0,
         asked: Callable[[float, int], float] = lambda _t, _i: EACH,
         lag: float = 0.04,
+        aloft: bool = False,
     ) -> None:
         """For the first ``takeoff_s`` [s] thrust rises from none, and the ground carries.
 
-        Of each rotor a thrust is ``asked`` [N], and it follows with a ``lag`` [s].
+        Of each rotor a thrust is ``asked`` [N], and it follows with a ``lag`` [s]. Whoever is
+        ``aloft`` has no ground near.
         """
         self.takeoff_s, self.asked, self.lag = takeoff_s, asked, lag
         self.given = given
@@ -61,6 +63,7 @@ class Motion:
         self.told_s = math.inf
         self.history: list[Damage] = []
         self.loops = in_hover(AIRFRAME, estimate(0.0, (0.0, 0.0, 0.0), 9.81))
+        self.loops.watch.aloft = aloft
 
     def run(
         self,
@@ -233,6 +236,18 @@ def test_a_rotor_that_gives_too_much_does_not_obey_and_is_counted_on_as_it_is() 
     assert damage.rotor == "rotor 1 (rear) does not obey"
     assert damage.health.least[0] == damage.health.most[0] > 0.0
     assert damage.severe
+
+
+@pytest.mark.parametrize("rotor", range(4))
+def test_what_lifts_a_vehicle_high_above_the_ground_is_not_the_ground(rotor: int) -> None:
+    """For a second after a push nothing was judged; a late rotor and a limp joint push like it."""
+
+    def lifts(t: float) -> float:
+        return 5.0 if FAULT_S - 0.6 < t < FAULT_S - 0.4 else 0.0
+
+    high, low = Motion(weak(rotor, 0.5), aloft=True), Motion(weak(rotor, 0.5))
+    assert high.run(FAULT_S + 0.3, push=lifts).rotor.startswith(NAMES[rotor])
+    assert not low.run(FAULT_S + 0.3, push=lifts).rotor
 
 
 def test_a_weak_rotor_that_is_well_again_is_forgotten() -> None:
