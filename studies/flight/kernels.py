@@ -57,7 +57,7 @@ def compile_first(
     running = [
         subprocess.Popen(
             # -P: a directory of the same name where the user stands must not be imported.
-            [sys.executable, "-P", "-m", __name__, half],
+            [sys.executable, "-P", "-m", __name__, half, str(os.getpid())],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
@@ -138,7 +138,8 @@ def _build_above_px4() -> None:
 if __name__ == "__main__":
     from fsw.runtime.process import die_with_parent, pin_numerics_to_one_thread
 
-    die_with_parent(os.getppid())
+    # Who has started it may be gone before the imports are over, and says who it is.
+    die_with_parent(int(sys.argv[2]) if sys.argv[2:3] and sys.argv[2].isdigit() else os.getppid())
     pin_numerics_to_one_thread()
     gc.set_threshold(_YOUNG)
     compile_half(sys.argv[1], above_px4="px4" in sys.argv[2:])

@@ -274,7 +274,6 @@ def test_a_failure_is_no_plan() -> None:
     answer = slsqp.plan(request(behind, below((3.0, 0.0, -1.2)), WALLS))
     assert isinstance(answer, PlanFailure)
     assert answer.status is not SolverStatus.INPUT_REFUSED
-    assert "iterations" in answer.reason
 
 
 def test_what_is_searched_in_one_piece_is_timed_in_one_piece(
