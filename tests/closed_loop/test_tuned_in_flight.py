@@ -25,7 +25,7 @@ EVERYTHING: Tuning = (
     ("tuning.joint.kp", 380.0),
     ("tuning.tracking.input_weight", 1.7e-7),
     ("tuning.tracking.observer_bandwidth", 120.0),
-    ("limits.climb_speed", 0.3),
+    ("limits.mission_speed", 0.3),
     ("upset_distance", 0.2),
 )
 TOO_LITTLE_KEPT: Tuning = (("planner.walls.lambda_", 0.1),)

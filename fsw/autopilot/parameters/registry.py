@@ -88,12 +88,14 @@ class Parameter:
 
 
 # Who may let the vehicle go farther, what of it keeps clear, what makes it fall, what promises are
-# made for, and how high a return flies and whether it lands, are chosen before it flies.
+# made for, how high it flies, how fast it climbs and sinks and whether a return lands, are chosen
+# before it flies; so is what is known of sensors, by which the estimate would jump.
 _DISARMED: Final = frozenset(
     {"SAFE_OWNER", "PLN_BODY", "CBRK_FLIGHTTERM"}
     | {"RTL_RETURN_ALT", "RTL_DESCEND_ALT", "RTL_LAND_DELAY"}
+    | {"LND_SPEED", "TKO_SPEED", "STR_ALT_MAX"}
 )
-_ASSUMED: Final = "surroundings."
+_ASSUMED: Final = ("surroundings.", "estimator.")
 _ENDS: Final = "Terminate"
 _RETREAT: Final = "Retreat along the normal, then hold"
 

@@ -465,13 +465,18 @@ def _too_close(place: Vec3, context: Situation) -> str | None:
 
 
 def _circle_too_close(centre: Vec3, radius: float, context: Situation) -> str | None:
-    body = context.config.body
-    for number in range(len(context.mission.safe_set.zones)):
+    body, safe_set = context.config.body, context.mission.safe_set
+    up, down = hull_reach(body, (0.0, 0.0, -1.0)), hull_reach(body, (0.0, 0.0, 1.0))
+    farthest = radius + hull_reach(body, (1.0, 0.0, 0.0)) + max(up, down)
+    for number in range(len(safe_set.zones)):
+        middle = surface(safe_set, number, centre, context.estimate.t_us)
+        if middle is None or middle.distance > farthest:
+            continue  # no place on the circle is nearer by more than its radius
 
         def room(angle: float, number: int = number) -> float:
             x, y, z = centre
             place = (x + radius * math.cos(angle), y + radius * math.sin(angle), z)
-            at = surface(context.mission.safe_set, number, place, context.estimate.t_us)
+            at = surface(safe_set, number, place, context.estimate.t_us)
             return 1.0 if at is None else at.distance - hull_reach(body, at.normal)
 
         # The nearest of some places on the circle, then of as many between its neighbours.

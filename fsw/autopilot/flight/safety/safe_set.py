@@ -167,6 +167,10 @@ class SafeSetCheck:
         problem = safe_set_problem(fence, self._config.surroundings.zone_speed)
         if problem is not None:
             return problem
+        if here.flies and self._is_stranger(update.source, mission):
+            tied = _follows(mission.fence, fence)
+            if tied:
+                return f"{tied}, which {mission.owner} owns"
         if not self._may_grow(mission, update, here):
             grown = growth(mission.fence, fence)
             if grown:
@@ -329,6 +333,12 @@ class SafeSetCheck:
         if chosen not in (0, source.system):
             return False
         return owner is None or source.is_same(owner) or bool(chosen and owner.system != chosen)
+
+    def _is_stranger(self, source: MessageSource | None, mission: MissionMemory) -> bool:
+        """Whether somebody else owns what is announced."""
+        if source is None or mission.owner is None:
+            return False
+        return not self._is_owner(source, mission.owner)
 
     @property
     def _chosen(self) -> int:

@@ -30,7 +30,7 @@ from tests.fsw.records import with_record
 
 STILL: Vec3 = (0.0, 0.0, 0.0)
 HERE: Vec3 = (0.0, 0.0, -5.0)
-SLOW: Tuning = (("limits.climb_speed", 0.2), ("planner.weights.tracking", 12.0))
+SLOW: Tuning = (("limits.mission_speed", 0.2), ("planner.weights.tracking", 12.0))
 UNSAFE: Tuning = (("planner.walls.lambda_", 0.1),)
 WALLED = SafeSet((wall((-1.0, 0.0, 0.0), -50.0, 0.1),))
 SOFT = replace(CONFIG, soft=True)
@@ -123,6 +123,12 @@ def test_what_breaks_an_inequality_is_not_taken_while_armed_unless_softly(
         ("limits.station_loss_action", 5.0, True),
         ("limits.fence_action", 5.0, False),
         ("surroundings.disturbance", 0.0, True),
+        # References and estimates jumped, by metres and degrees.
+        ("limits.land_speed", 0.6, True),
+        ("limits.climb_speed", 1.5, True),
+        ("steering.highest", 2.0, True),
+        ("estimator.pose.attitude_floor", 1.0, True),
+        ("estimator.gnss.delay", 0.2, True),
     ],
 )
 def test_what_would_let_anybody_end_the_flight_waits_for_disarming(
@@ -159,7 +165,7 @@ def test_what_is_broken_already_is_no_reason_against_another_change() -> None:
     loop = TunedAutopilot(CONFIG)
     on_ground, _ = tick(loop, walled(Mode.DISARMED), UNSAFE)
     armed = replace(on_ground, vehicle=replace(on_ground.vehicle, mode=Mode.HOLD))
-    both = (*UNSAFE, ("limits.climb_speed", 0.2))
+    both = (*UNSAFE, ("limits.mission_speed", 0.2))
     state, outputs = tick(loop, armed, both)
     assert (state.tuning, outputs.tuning_taken) == (both, True)
 

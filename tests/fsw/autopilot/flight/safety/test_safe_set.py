@@ -334,6 +334,10 @@ def test_no_stranger_ties_the_vehicle_to_where_anybody_sends_targets() -> None:
     assert kept.safe_set == SafeSet((NORTH,))
     assert "would follow the target" in refused(texts)
     assert received(memory, both)[0].safe_set == both
+    for source in (STRANGER, OWNER):
+        tied, texts = uploaded(memory, source, fence=SafeSet((SPHERE,)), flies=True)
+        assert bool(tied.fence.zones) is (source is OWNER)
+        assert ("would follow the target" in texts[0].text) is (source is STRANGER)
     owned, _ = received(MissionMemory(), both)
     shrunk, _ = received(owned, SafeSet((NORTH, SPHERE, TREE)), source=STRANGER)
     assert shrunk.safe_set == SafeSet((NORTH, SPHERE, TREE)), "it was there before"
