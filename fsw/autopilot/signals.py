@@ -619,7 +619,7 @@ class StateEstimate(NamedTuple):
 
 
 class PredictionState(NamedTuple):
-    """State of the prediction model: the paper's twelve plus the attitude lag's seven."""
+    """State of the prediction model: for two joints the paper's twelve plus seven of the lag."""
 
     p: Vec3  # m, body origin
     v: Vec3  # m/s

@@ -25,7 +25,7 @@ from sitl.simulation import START_US
 from sitl.trajectory import TrajectoryPoint
 from sitl.zones import Zone, zones_of
 
-TARGET_INTERVAL_US: Final = 100_000  # one point a planning period
+TARGET_INTERVAL_US: Final = 100_000  # 10 points a second; it need not be the planning period
 TARGET_LEAD_US: Final = 2_000_000  # 1.5 s are promised; the rest covers a lost datagram
 MESSAGES_PER_STEP: Final = 8  # keeps a datagram below 1400 bytes
 

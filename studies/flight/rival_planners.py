@@ -23,8 +23,8 @@ from fsw.autopilot.barriers.zone_rows import ZoneRows
 from fsw.autopilot.model.body import body_of
 from fsw.autopilot.model.prediction import CondensedModel
 from fsw.autopilot.mpc.costs import Cost, TrackingCost
+from fsw.autopilot.mpc.optimisers import OPTIMISERS
 from fsw.autopilot.mpc.planner_config import PlannerConfig
-from fsw.autopilot.mpc.solvers import SOLVERS
 from fsw.autopilot.mpc.variants import VARIANTS, OcpTerms
 from fsw.autopilot.shapes import kind_of
 from fsw.autopilot.signals import SafeSet, Zone
@@ -99,4 +99,4 @@ def _split(safe_set: SafeSet) -> tuple[tuple[Zone, ...], SafeSet]:
 
 
 VARIANTS.update(naive=_naive, hc=_hard, sc=_soft)
-SOLVERS["slsqp"] = by_slsqp
+OPTIMISERS["slsqp"] = by_slsqp

@@ -17,9 +17,9 @@ import numpy as np
 from fsw.autopilot.barriers.constraint_block import TargetPoints
 from fsw.autopilot.model.prediction import Array
 from fsw.autopilot.mpc.ocp import Ocp
+from fsw.autopilot.mpc.optimisers import Question, Search, Stopwatch
 from fsw.autopilot.mpc.planner_config import PlannerConfig
 from fsw.autopilot.mpc.qp_data import CONE, QpData, Solution
-from fsw.autopilot.mpc.solvers import Question, Search, Stopwatch
 from fsw.autopilot.signals import SolverStatus
 
 Slopes = tuple[Callable[[Array], Array], Callable[[Array], Array]]

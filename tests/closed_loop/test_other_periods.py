@@ -1,4 +1,4 @@
-"""The planner at 20 Hz and the tick at 1 kHz are one line each, and fly.
+"""The planner at 20 Hz is one line, the tick at 1 kHz one of each program, and all fly.
 
 The periods are constants that other modules read while they are imported, so each flight has a
 process of its own: ``python -m tests.closed_loop.test_other_periods PERIODS SUITE`` sets them,
@@ -33,7 +33,7 @@ TICK = {"fsw.autopilot.periods.TICK_US": 1_000, "sitl.periods.STEP_US": 1_000}
         pytest.param(PLANNING | TICK, 50_000, id="both"),
     ],
 )
-def test_other_periods_are_a_line_each_and_fly(
+def test_other_periods_are_a_line_or_two_and_fly(
     periods: dict[str, int], planning_us: int, suite: str
 ) -> None:
     command = ["-m", "tests.closed_loop.test_other_periods", json.dumps(periods), suite]

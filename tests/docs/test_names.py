@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import re
 from pathlib import Path
 
@@ -61,14 +62,44 @@ OTHER = {
 }  # fmt: skip
 
 
-def test_the_beginnings_of_status_texts_occur_in_the_code() -> None:
+def status_text_forms() -> list[str]:
+    """What the page has status texts begin with."""
     page = (DOCS / "reference" / "status-texts.md").read_text(encoding="utf-8")
     forms = page.split("## Forms")[1]
-    quoted = [
+    return [
         text
         for row in re.findall(r"^\| (`.*?) \|", forms, re.M)
         for text in re.findall(r"`([^`]{4,})`", row)
     ]
+
+
+def status_text_beginnings(path: Path) -> list[str]:
+    """What status texts of a file begin with, where it is written in their call and has a colon."""
+    found = []
+    for call in ast.walk(ast.parse(path.read_text("utf-8"))):
+        if not isinstance(call, ast.Call) or len(call.args) < 2:
+            continue
+        if ast.unparse(call.func) not in ("StatusText", "self._tell", "self._say"):
+            continue
+        text = call.args[1]
+        first = text.values[0] if isinstance(text, ast.JoinedStr) else text
+        if isinstance(first, ast.Constant) and isinstance(first.value, str):
+            found.append(first.value)
+    return [text for text in found if ":" in text]
+
+
+def test_the_beginnings_of_status_texts_occur_in_the_code() -> None:
+    quoted = status_text_forms()
     code = "\n".join(path.read_text("utf-8") for path in (ROOT / "fsw").rglob("*.py"))
     assert quoted
     assert [text for text in quoted if text.removesuffix(" N") not in code] == []
+
+
+def test_the_beginnings_of_status_texts_in_the_code_are_on_the_page() -> None:
+    """A beginning that is put together elsewhere is not looked for."""
+    forms = tuple(text.removesuffix(" N") for text in status_text_forms())
+    written = [
+        text for path in (ROOT / "fsw").rglob("*.py") for text in status_text_beginnings(path)
+    ]
+    assert "reference limited: " in written
+    assert [text for text in written if not text.startswith(forms)] == []

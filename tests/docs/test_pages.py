@@ -59,6 +59,18 @@ def test_files_named_in_the_text_exist(page: Path) -> None:
     assert [name for name in files if name not in generated and not (ROOT / name).exists()] == []
 
 
+@pytest.mark.parametrize("page", PAGES, ids=named)
+def test_a_table_is_one_block_with_a_header(page: Path) -> None:
+    """Rows that an empty line cuts off are shown as text: they have no header of their own."""
+    blocks = re.findall(r"(?:^[ ]*\|.*\n?)+", without_fences(page), re.MULTILINE)
+    headless = [
+        block.splitlines()[0]
+        for block in blocks
+        if not re.match(r"[^\n]*\n[ ]*\|(?:[ ]*:?-+:?[ ]*\|)+[ ]*(?:\n|$)", block)
+    ]
+    assert headless == []
+
+
 def test_decisions_that_the_code_cites_exist() -> None:
     cited = {
         name

@@ -66,7 +66,8 @@ class BarrierTuning:
     def following(self, recent: float, least: float) -> float:
         """Lambda [m/s] where no more than ``recent`` [m/s^2] of disturbance was observed of late.
 
-        It goes down to ``least`` [m/s], and is whole from ``LOUD`` on and where ``least`` is 0.
+        It goes down to ``least`` [m/s]; from ``LOUD`` on, and where ``least`` is 0, it has its full
+        value.
         """
         if not 0.0 < least < self.lambda_:
             return self.lambda_

@@ -1,1 +1,1 @@
-"""The 10 Hz planner: reference, linearisation, program, solver."""
+"""The planner: reference, linearisation, program, solver."""

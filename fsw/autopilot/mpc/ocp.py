@@ -1,4 +1,7 @@
-"""The optimal control problem of one safe set: everything that is built once and refilled."""
+"""The optimal control problem of one safe set: everything that is built once and refilled.
+
+``by_programs`` in ``optimisers.py`` calls ``linearise`` and ``solve`` in turn.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""One 10 Hz cycle: linearise, refill, solve, twice; then a plan or the reason for none.
+"""One planning cycle: from a request to a plan, or the reason for none.
+
+Between the two is an optimiser: ``by_programs`` in ``optimisers.py`` linearises, refills and
+solves, twice.
 
 Source: docs/equations.md E17.
 """
@@ -16,9 +19,9 @@ from fsw.autopilot.model.airframe import Airframe
 from fsw.autopilot.model.nominal import rest_state
 from fsw.autopilot.model.prediction import QDD_ARM, YAW_ACC, Array, condense, to_vector
 from fsw.autopilot.mpc.ocp import Ocp
+from fsw.autopilot.mpc.optimisers import OPTIMISERS, Question, Search
 from fsw.autopilot.mpc.planner_config import PlannerConfig
 from fsw.autopilot.mpc.reference import still_at
-from fsw.autopilot.mpc.solvers import SOLVERS, Question, Search
 from fsw.autopilot.mpc.variants import VARIANTS
 from fsw.autopilot.shapes.half_space import wall
 from fsw.autopilot.shapes.target_sphere import target_sphere
@@ -49,7 +52,7 @@ class Planner:
         Raises:
             ValueError: The controller or the solver is one of a study that is not imported.
         """
-        for name, known in ((config.controller, VARIANTS), (config.solver, SOLVERS)):
+        for name, known in ((config.controller, VARIANTS), (config.solver, OPTIMISERS)):
             if name not in known:
                 raise ValueError(f"{name} is flown for comparison; start it with pandion")
         self._untuned = self._config = config
@@ -109,7 +112,7 @@ class Planner:
             np.array(request.pushes) if request.pushes else None,
         )
         asked = Question(ocp, start, targets, self._guess(request.t_apply_us))
-        search = SOLVERS[self._config.solver](asked, self._config, self._stopwatch_us)
+        search = OPTIMISERS[self._config.solver](asked, self._config, self._stopwatch_us)
         solution = search.solution
         if not solution.usable:
             timings = _timings(search, self._stopwatch_us() - begin)

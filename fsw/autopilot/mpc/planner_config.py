@@ -29,7 +29,7 @@ class PlannerConfig:
     controller: str = "blf"  # a name in variants.py; those that it is compared with in studies
     horizon: int = HORIZON_US // PLANNING_US  # n
     period_us: int = PLANNING_US  # T
-    solver: str = "clarabel"  # a name in solvers.py; slsqp is the paper's
+    solver: str = "clarabel"  # a name in optimisers.py; slsqp is the paper's
     sqp_iterations: int = 2  # slsqp goes on until it converges
     body: BodyName = "full"  # what keeps clear; "points" are the paper's
     weights: CostWeights = field(default_factory=CostWeights)

@@ -18,9 +18,9 @@ from fsw.autopilot.barriers.constraint_block import TargetPoints
 from fsw.autopilot.model.airframe import AIRFRAME
 from fsw.autopilot.model.prediction import Array, condense
 from fsw.autopilot.mpc.ocp import Ocp
+from fsw.autopilot.mpc.optimisers import Question, Search
 from fsw.autopilot.mpc.planner_config import PlannerConfig
 from fsw.autopilot.mpc.qp_data import Solution
-from fsw.autopilot.mpc.solvers import Question, Search
 from fsw.autopilot.shapes.half_space import wall
 from fsw.autopilot.shapes.target_sphere import target_sphere
 from fsw.autopilot.signals import PlanFailure, SafeSet, SolverStatus

@@ -5,7 +5,7 @@ from __future__ import annotations
 from fsw.autopilot.model.body import BODIES
 from fsw.autopilot.parameters.control_choice import INNER_LOOPS, KNOWN
 from fsw.autopilot.parameters.flight_config import INNERS, ROBUSTNESS_PRESETS
-from studies.flight.rival_planners import SOLVERS, VARIANTS
+from studies.flight.rival_planners import OPTIMISERS, VARIANTS
 
 
 def test_every_name_offered_can_be_built_and_none_is_left_out() -> None:
@@ -13,7 +13,7 @@ def test_every_name_offered_can_be_built_and_none_is_left_out() -> None:
         "controller": set(VARIANTS),
         "tracking": set(INNER_LOOPS),
         "lambda": set(ROBUSTNESS_PRESETS),
-        "solver": set(SOLVERS),
+        "solver": set(OPTIMISERS),
         "body": set(BODIES),
     }
     # PX4's are flown by a link, not by a name.

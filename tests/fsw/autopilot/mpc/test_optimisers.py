@@ -12,9 +12,9 @@ import pytest
 from fsw.autopilot.barriers.constraint_block import TargetPoints
 from fsw.autopilot.model.prediction import Array
 from fsw.autopilot.mpc.ocp import Ocp
+from fsw.autopilot.mpc.optimisers import Question, Search, by_programs
 from fsw.autopilot.mpc.planner_config import PlannerConfig
 from fsw.autopilot.mpc.qp_data import Solution
-from fsw.autopilot.mpc.solvers import Question, Search, by_programs
 from fsw.autopilot.signals import SolverStatus
 
 INPUTS, SLACKS = 6, 2

@@ -1,6 +1,9 @@
 """Optimisers of the planner, by name: one signature and one table.
 
-Another one is a function and a row in ``SOLVERS`` (and in
+An optimiser finds the inputs of one request. The one that flies asks a ``QpSolver`` for each
+quadratic program, the ``DualSolver``, which asks Clarabel.
+
+Another one is a function and a row in ``OPTIMISERS`` (and in
 ``fsw.autopilot.parameters.control_choice``, which names it for the command line without importing
 it). The paper's own is that of ``studies.flight.rival_planners``.
 """
@@ -25,9 +28,9 @@ class Question(NamedTuple):
     """What is to be optimised for one request."""
 
     ocp: Ocp  # of the safe set; holds the program around the optimum afterwards
-    start: Array  # (19,) SI, prediction state at node 0
+    start: Array  # (states,) SI, prediction state at node 0
     targets: TargetPoints  # at the nodes
-    guess: Array  # (6 n,) SI, the last solution moved on by one period, or zeros
+    guess: Array  # (inputs n,) SI, the last solution moved on by one period, or zeros
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +45,7 @@ class Search:
 
 
 def by_programs(asked: Question, config: PlannerConfig, stopwatch_us: Stopwatch) -> Search:
-    """A fixed number of quadratic programs from the guess on."""
+    """From the guess on linearise, refill and solve a fixed number of times, two as configured."""
     ocp, start, targets, inputs = asked
     linearise_us = solve_us = 0.0
     iterations = done = 0
@@ -61,6 +64,6 @@ def by_programs(asked: Question, config: PlannerConfig, stopwatch_us: Stopwatch)
     return Search(solution, done, iterations, linearise_us, solve_us)
 
 
-SOLVERS: dict[str, Callable[[Question, PlannerConfig, Stopwatch], Search]] = {
-    "clarabel": by_programs,
+OPTIMISERS: dict[str, Callable[[Question, PlannerConfig, Stopwatch], Search]] = {
+    "clarabel": by_programs,  # what users name: the library that solves its programs
 }
