@@ -2,7 +2,8 @@
 
 The loop walks the table from top to bottom, each group's members from left to right. In real time
 releases are an absolute schedule on the monotonic clock; a missed one is skipped and counted, and
-shifts nothing. In lockstep each step of the simulator is one. PLAN runs where a tick has asked.
+shifts nothing. In lockstep each step of the simulator is one
+release. PLAN runs where a tick has asked.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from fsw.runtime.timing import GroupTimer, Histogram
 
 Cycle = TypeVar("Cycle")
 
-# Ticks between two whose members are timed one by one. It has no divisor in common with the ticks
+# Every 27th tick is timed member by member. The number has no divisor in common with the ticks
 # of a planning period, so that every place in one is timed as often.
 STAGES_EVERY: Final = 27
 

@@ -251,7 +251,7 @@ def keep_off_zones(
     if law.follows_plan:
         asked = wanted_accelerations(law.tracking, r.estimate, motion, r.observed, r.plan, r.u)
     level = law.filter.level
-    surface = r.observed.known  # thrust does what surfaces do not
+    surface = r.observed.known  # add it: what is filtered is motion, not thrust
     asked = asked[0] + surface[0], asked[1] + surface[1], asked[2] + surface[2]
     wanted = clamp_magnitude(asked[0], level), clamp_magnitude(asked[1], level), asked[2]
     a = add_scaled(motion.a, r.observed.d, 1.0)
@@ -380,7 +380,7 @@ def note_weight(r: Tick, airframe: Airframe) -> None:
 
 
 @compilable
-def tell_filter(
+def expect_next_tick(
     r: Tick, airframe: Airframe, rotor_decay: float, found: Expected, explains: bool, judged: bool
 ) -> None:
     """Write what is expected of the next tick, after which ``rotor_decay`` [1] of a lag is left.

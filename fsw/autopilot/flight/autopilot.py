@@ -97,7 +97,8 @@ _STILL = SensorFrame(
     q_arm=(),
     qd_arm=(),
 )
-_DESCEND = Mode.DESCEND  # ten times as fast as Mode.X
+# A name of the module is looked up ten times faster than a member of an enumeration.
+_DESCEND = Mode.DESCEND
 
 
 class Controlled(NamedTuple):
@@ -185,19 +186,20 @@ class Autopilot:
         texts: list[StatusText] = []
         if state.vehicle.restarts:
             state = restarted(state, self.config.airframe)
-        came = inputs
+        # Ranges are looked for in all that was received, those of missed ticks included.
+        as_received = inputs
         if state.index >= 0 and inputs.samples:
             state, inputs = self._sensed.take_missed(state, inputs)
         state, r, estimate, fusion, caught = self._estimate(state, inputs, texts)
         began = state.record
-        state = self._receive(state, came, texts)
+        state = self._receive(state, as_received, texts)
         if estimate is None:
             return self._blind(state, r, inputs, texts)._replace(fusion=fusion, caught=caught)
 
         acks: list[CommandAck] = []
         if inputs.commands:
             state, acks = self._commander.handle_commands(state, estimate, inputs.commands, texts)
-        state = self._with_evidence(state, estimate)
+        state = self._note_tilt_load_and_jump(state, estimate)
         state = self._commander.check_failsafes(state, estimate, texts)
         state = self._commander.check_mode_completion(state, estimate, texts)
 
@@ -248,10 +250,12 @@ class Autopilot:
 
         What it finds out is acted upon in the next tick.
         """
-        c = controlled
-        outputs, inputs, state, r, estimate, fusion, flown = c[:7]
-        plan, texts, safety, reset = c.plan, outputs.texts, state.safety, None
-        flags = r.flags if flown and not c.calm else 0  # a calm tick has none
+        # All fields, in their order: eight of them by name would take 0.15 us longer.
+        outputs, inputs, state, r, before, fusion, flown, plan, ticks, replaced, known, calm = (
+            controlled
+        )
+        texts, safety, reset, estimate = outputs.texts, state.safety, None, before
+        flags = r.flags if flown and not calm else 0  # a calm tick has none
         if estimate is not None and (flags & OFF_PLAN or safety.off_plan_us >= 0):
             safety = self._watch.off_plan(
                 safety,
@@ -260,9 +264,9 @@ class Autopilot:
                 state.accuracy.reach,
                 max(self._wind_room(r)),
             )
-        if fusion is not None and not (c.calm and self._sensed.rests(state, fusion, inputs)):
-            estimate = r.state_estimate if c.calm else estimate
-            caught = c.caught or self._sensed.catch_up(state, fusion, estimate, inputs)
+        if fusion is not None and not (calm and self._sensed.rests(state, fusion, inputs)):
+            estimate = r.state_estimate if calm else estimate
+            caught = known or self._sensed.catch_up(state, fusion, estimate, inputs)
             fusion, found, reset, said = caught
             texts = (*texts, *said) if said else texts
             if reset is not None:
@@ -270,19 +274,19 @@ class Autopilot:
             if found is not None and found is not estimate:
                 r.state_estimate = found
             estimate = found
-        if c.calm and texts is outputs.texts and reset is None:
-            damage = state.damage if fusion is None else self._see_damage(state, r, c)
+        if calm and texts is outputs.texts and reset is None:  # all that is left to do is little
+            damage = state.damage if fusion is None else self._see_damage(state, r, controlled)
             state = self.calm.after(state, r, fusion)
             if damage is not state.damage:
                 state = replace(state, damage=damage)
             return state, replace(outputs, shown=Shown(state, inputs.sensors))
-        if estimate is None or (c.estimate is None and not c.calm):
+        if estimate is None or (before is None and not calm):
             # Ticks are counted from the first estimate on; what looks now and then goes by time.
             t_us = inputs.sensors.t_us
             unknown = nothing_known(outputs, state, t_us, texts)
             return replace(state, t_us=t_us, fusion=fusion), unknown
         now_us, per_plan = inputs.sensors.t_us, self._ticks_per_plan
-        index = state.index + c.ticks
+        index = state.index + ticks
         request = None
         if index // per_plan != state.index // per_plan:
             nominal = r.plan_state if flown else None
@@ -293,12 +297,12 @@ class Autopilot:
             state,
             index=index,
             t_us=now_us,
-            output_replaced=c.replaced,
+            output_replaced=replaced,
             record=r,
             plan=plan,
             safety=self._filtered(state, safety, estimate, r.margin, flags),
             fusion=fusion,
-            damage=self._see_damage(state, r, c),
+            damage=self._see_damage(state, r, controlled),
         )
         shown = Shown(state, inputs.sensors)
         return state, replace(outputs, shown=shown, plan_request=request, texts=texts)
@@ -344,8 +348,11 @@ class Autopilot:
         outputs = TickOutputs(still, Mode.DISARMED, False, acks=tuple(acks), texts=tuple(texts))
         return Controlled(outputs, inputs, state, r)
 
-    def _with_evidence(self, state: FlightState, estimate: StateEstimate) -> FlightState:
-        """What the failsafe table looks at and what is not kept up to date elsewhere."""
+    def _note_tilt_load_and_jump(self, state: FlightState, estimate: StateEstimate) -> FlightState:
+        """What the failsafe table looks at and what is not kept up to date elsewhere.
+
+        A tilt with no way back, rotors that carry too little, time that jumped.
+        """
         safety, watch = state.safety, self._watch
         tilted = safety.rolled_us >= 0 or safety.pitched_us >= 0
         if tilted or not estimate.R_WB[8] > watch.upright:
@@ -407,7 +414,7 @@ class Autopilot:
         """Store received targets, safe set, mission, setpoints and ground station heartbeat."""
         now_us = inputs.sensors.t_us
         if inputs.targets or inputs.announced or inputs.mission is not None or inputs.refused:
-            state = self._believe(state, inputs, texts)
+            state = self._store_uploads(state, inputs, texts)
         ranges = [one for one in inputs.samples if type(one) is RangeSample]
         if ranges:
             state = replace(state, vehicle=with_range(state.vehicle, ranges[-1]))
@@ -428,7 +435,7 @@ class Autopilot:
             state = replace(state, offboard=offboard)
         return state
 
-    def _believe(
+    def _store_uploads(
         self, state: FlightState, inputs: TickInputs, texts: list[StatusText]
     ) -> FlightState:
         """Store targets, safe set and mission, as far as they are within bounds."""

@@ -19,7 +19,7 @@ from fsw.autopilot.estimation.estimator import reading_of
 from fsw.autopilot.estimation.fusion_memory import FusionMemory
 from fsw.autopilot.flight.estimate.sensed_state import SensedState
 from fsw.autopilot.flight.failsafe.evidence import PLAN_STALE_PERIODS
-from fsw.autopilot.flight.failsafe.table import SLOW_US, quickly_active
+from fsw.autopilot.flight.failsafe.table import SLOW_US, active_between
 from fsw.autopilot.flight.fast_loop import BELIEVED, FastLoop
 from fsw.autopilot.flight.plan_exchange import planned_input
 from fsw.autopilot.flight.safety.damage_watch import DamageWatch
@@ -164,5 +164,5 @@ def _is_calm(state: FlightState, config: FlightConfig) -> bool:
         and plan.running is not None
         and state.t_us >= plan.since_us
         and not (vehicle.conditions or state.safety.is_open or state.aiding.lost)
-        and not quickly_active(Situation(state, estimate, config))
+        and not active_between(Situation(state, estimate, config))
     )

@@ -1,5 +1,7 @@
 """The commander: commands, failsafes and completed modes move the vehicle between modes.
 
+It sets the home position too: at the first estimate, when arming, and by command.
+
 What changes the state returns a new one; almost every tick none does.
 """
 
@@ -14,7 +16,7 @@ from fsw.autopilot.flight.commands.dedup import answered_before, remember, still
 from fsw.autopilot.flight.commands.handlers import Decision, decide
 from fsw.autopilot.flight.failsafe.conditions import NOTHING_DONE, Action
 from fsw.autopilot.flight.failsafe.response import overridden, respond
-from fsw.autopilot.flight.failsafe.table import ROWS, SLOW_US, active, quickly_active
+from fsw.autopilot.flight.failsafe.table import ROWS, SLOW_US, active, active_between
 from fsw.autopilot.flight.land_detector import in_the_air, stands
 from fsw.autopilot.flight.modes import MODES
 from fsw.autopilot.flight.modes.base import CONTINUE, FlightMode, Handover
@@ -50,7 +52,8 @@ from fsw.autopilot.signals import (
 )
 from fsw.frozen import replace
 
-_DISARMED = Mode.DISARMED  # ten times as fast as Mode.X
+# A name of the module is looked up ten times faster than a member of an enumeration.
+_DISARMED = Mode.DISARMED
 _RESTARTS = "command refused: the flight software restarts; send it again"
 _AWAY = 0.3  # m off a surface that it has touched, or that is not as announced
 
@@ -140,7 +143,7 @@ class Commander:
         if vehicle.mode is Mode.FAULT:
             return state  # what ended the flight stays on show
         context = self.situation(state, estimate)
-        rows = active(context) if slowly else quickly_active(context)
+        rows = active(context) if slowly else active_between(context)
         before = vehicle.conditions
         if not rows and not before:
             return state
@@ -185,11 +188,10 @@ class Commander:
     def check_mode_completion(
         self, state: FlightState, estimate: StateEstimate, texts: list[StatusText]
     ) -> FlightState:
-        """Update the mode; when it is complete, switch to the next one."""
+        """Update the mode; when it is complete, switch to the next one. At first set home."""
         vehicle = state.vehicle
         if vehicle.home is None:
-            home = Home(estimate.p_WB, estimate.yaw)
-            return replace(state, vehicle=replace(vehicle, home=home))
+            return _with_home(state, estimate)
         if vehicle.mode is _DISARMED:
             return self._check_intended_mode(state, estimate, texts)
         state, result = self.mode(state).update(state, estimate)
@@ -399,6 +401,12 @@ def acknowledgement(command: Command, result: int) -> CommandAck:
     """The answer to its sender."""
     request = command.request
     return CommandAck(request.command, result, request.source_system, request.source_component)
+
+
+def _with_home(state: FlightState, estimate: StateEstimate) -> FlightState:
+    """The home position is where the vehicle is."""
+    home = Home(estimate.p_WB, estimate.yaw)
+    return replace(state, vehicle=replace(state.vehicle, home=home))
 
 
 def _lift_off(state: FlightState, estimate: StateEstimate) -> FlightState:

@@ -3,16 +3,17 @@
 ======  ===========================================  ======================  =======================
 stage   law                                          reads                   writes
 ======  ===========================================  ======================  =======================
-EXPECT  ``tell_filter``, ``control/cascade.py``      record before the tick  ``expected`` of request
+EXPECT  ``expect_next_tick``, ``cascade.py``         record before the tick  ``expected`` of request
 FRAME   ``read_into``, ``estimation/estimator.py``   reading                 estimate
-parts   ``run_filter``, ``estimation/kernels.py``    request, filter         filter, estimate
+filter  ``run_filter``, ``estimation/kernels.py``    request, filter         filter, estimate
 CALM    ``move_plan``, ``model/nominal.py``          plan, u                 plan
 LOOPS   ``close_loops``, ``control/cascade.py``      estimate, plan, u       sent, flags, the rest
 ======  ===========================================  ======================  =======================
 
-All are of every tick (500 Hz). A calm one (``calm_tick.py``) is one call of all; any other asks for
-some at a time, and decides in between. Other sensors (``fuse``), the watch over the actuators and
-the planner have calls of their own: the actuators do not wait for them.
+``filter_parts`` says which parts of the estimator's filter are done. All stages are of every tick
+(500 Hz). A calm one (``calm_tick.py``) is one call of all; any other asks for some at a time,
+and decides in between. Other sensors (``fuse``), the watch over the actuators and the planner have
+calls of their own: the actuators do not wait for them.
 """
 
 from __future__ import annotations
@@ -29,8 +30,8 @@ from fsw.autopilot.control.cascade import (
     KeepClear,
     close_loops,
     compare_with_plan,
+    expect_next_tick,
     note_weight,
-    tell_filter,
 )
 from fsw.autopilot.control.px4_loops import Px4Loops
 from fsw.autopilot.control.safety_filter import FilterProbes
@@ -91,11 +92,11 @@ def fast_loop(
     filters: Filter,
     estimators: Law,
     requests: NDArray[Any],
-    parts: int,
+    filter_parts: int,
     now: float,
     until: float,
 ) -> int:
-    """Do some ``stages`` [1] and, between them, ``parts`` [1] of the filter's tick; what came.
+    """Do some ``stages`` [1] and, between them, ``filter_parts`` [1]; what came of these.
 
     ``laws`` and ``models`` (1,) [SI] are of the loops and the plan, the record is that of
     ``records`` (1,) [SI], and ``reading`` (READINGS,) [SI] is of an exact state. A CALM tick ends
@@ -108,11 +109,11 @@ def fast_loop(
     found, known = 0, True
     if stages & EXPECT:
         explains, judged = stages & EXPLAINS != 0, stages & JUDGED != 0
-        tell_filter(r, law.airframe, law.rotor_decay, asked.expected, explains, judged)
+        expect_next_tick(r, law.airframe, law.rotor_decay, asked.expected, explains, judged)
     if stages & FRAME:
         known = read_into(r.estimate, reading, asked.t_us) == 0
-    if parts:
-        found = run_filter(filters[0], estimators[0], asked, parts, now, until)
+    if filter_parts:
+        found = run_filter(filters[0], estimators[0], asked, filter_parts, now, until)
         known = found & FINITE != 0
         if stages & LOOPS and known:
             r.estimate = asked.present
@@ -148,7 +149,7 @@ class FastLoop:
     def expected(self, r: Tick, *, explains: bool = True, judged: bool = False) -> Expected:
         """What the commands sent last make of joints and vehicle; it is good until the next call.
 
-        ``explains`` and ``judged`` are of ``tell_filter``.
+        ``explains`` and ``judged`` are of ``expect_next_tick``.
         """
         self._do(r, EXPECT | (EXPLAINS if explains else 0) | (JUDGED if judged else 0))
         return self._asked.expected

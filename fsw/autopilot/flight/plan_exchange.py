@@ -52,8 +52,8 @@ def with_arm_in_bounds(
 ) -> PredictionState:
     """The state with the arm in the nearest pose and at the nearest rate to plan from.
 
-    A hard push slings the arm about. A plan that began with it so would need seconds to catch it,
-    and the arm would follow the plan round and round.
+    A hard push slings the arm about. A plan that began from that pose would need seconds to
+    catch it, and the arm would follow the plan round and round.
     """
     q_arm = within_limits(arm_coordinates(airframe), x.q_arm, limits.joint_margin)
     rates = tuple([clamp_magnitude(rate, limits.joint_rate) for rate in x.qd_arm])
@@ -223,7 +223,7 @@ def without_plan(state: FlightState, estimate: StateEstimate) -> FlightState:
 def resumed(
     config: FlightConfig, state: FlightState, estimate: StateEstimate, motion: MotionState
 ) -> FlightState:
-    """The state after a time without ticks: no plan, to brake from the measured ``motion``.
+    """The state after a time without ticks: no plan; brake from the measured ``motion``.
 
     Over few missed ticks the plan is moved on as if they had been there. Over more, nothing that
     the loops remember says what happened: what moved the vehicle meanwhile was not their last

@@ -155,7 +155,8 @@ class MissionMemory:
     accepted: tuple[SafeSetAnnouncement, ...] = ()  # the last one of each source
     silent_zones: int = 0  # that moved, timed out, and are held where they were
     rally: tuple[Vec2, ...] = ()  # m, where a return may lead beside home
-    home_owner: Sender | None = None  # may change where a return ends while armed; None: the first
+    # May change where a return ends while armed; None: the first sender that changes it.
+    home_owner: Sender | None = None
     flight: MissionFlight = field(default_factory=MissionFlight)
 
 
@@ -177,7 +178,11 @@ class PlanMemory:
 
 @dataclass(frozen=True, slots=True)
 class SafetyMemory:
-    """Episodes off the plan and outside the safe set; times are when it was last so, -1: not."""
+    """Episodes off the plan and outside the safe set, and what else is unsafe.
+
+    ``off_plan_us``, ``breach_us``, ``fence_us`` and ``filter_us`` are when it was last so, the
+    ``us`` of roll, pitch and thrust since when it has been so; -1: it is not.
+    """
 
     off_plan_us: int = -1
     off_plan_by: float = 0.0  # m, when it began
@@ -190,8 +195,8 @@ class SafetyMemory:
     rolled_us: int = -1  # since when the roll has been beyond its limit; -1: it is not
     pitched_us: int = -1  # the same of the pitch
     light_us: int = -1  # since when rotors have carried too little to fly; -1: they carry enough
-    jump_us: int = 0  # how far time or the sensors' clock jumped from one tick to the next, lately
-    jumped_us: int = -1  # when
+    jump_us: int = 0  # how far time or the sensors' clock jumped at ``jumped_us``
+    jumped_us: int = -1  # when it jumped last, from one tick to the next
     counters: SafetyCounters = field(default_factory=SafetyCounters)
 
     @property
@@ -244,8 +249,8 @@ class Aiding(NamedTuple):
     pose: Sensor = Sensor.POSE  # that gives positions
     pose_fault: SensorFault = SensorFault.STALE
     position_sigma: float = 0.0  # m, of the worst axis, without what lasts of a sensor's error
-    elsewhere: float = 0.0  # m, how far away positions say it is that are refused meanwhile
-    unproven: Vec3 = _NOWHERE  # m, NED, by which jumps that none expected moved the estimate
+    elsewhere: float = 0.0  # m, how far the refused positions lie from the estimate
+    unproven: Vec3 = _NOWHERE  # m, NED, sum of unexpected jumps of the estimate
     velocity_sigma: float = 0.0  # m/s, as of the position
     attitude_sigma: float = 0.0  # rad, of roll and pitch
     height_sigma: float = 0.0  # m, with what lasts of a sensor's error

@@ -87,9 +87,9 @@ class Parameter:
         return f"{self.name} is to be {self.least:g}..{self.most:g}, {value:g} is refused"
 
 
-# Who may let the vehicle go farther, what of it keeps clear, what makes it fall, what promises are
-# made for, how high it flies, how fast it climbs and sinks and whether a return lands, are chosen
-# before it flies; so is what is known of sensors, by which the estimate would jump.
+# Parameters that only a disarmed vehicle takes: who may let it go farther, what of it keeps clear,
+# what makes it fall, how high it flies, how fast it climbs and sinks, whether a return lands, what
+# promises are made for, and what is known of sensors, by which the estimate would jump.
 _DISARMED: Final = frozenset(
     {"SAFE_OWNER", "PLN_BODY", "CBRK_FLIGHTTERM"}
     | {"RTL_RETURN_ALT", "RTL_DESCEND_ALT", "RTL_LAND_DELAY"}

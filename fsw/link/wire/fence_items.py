@@ -1,4 +1,4 @@
-"""A fence as ground stations upload it, read into the safe set that the barriers keep.
+"""A geofence as ground stations upload it, read into the safe set that the barriers keep.
 
 ===========================  ==================================================================
 item                         here

@@ -101,7 +101,7 @@ class FailsafeMemory(NamedTuple):
 
     since_us: tuple[int, ...] = ()  # when each of them became active, in their order
     action: Action = Action.NONE  # the strongest that was taken since the pilot commanded a mode
-    cause: Condition | None = None  # of that
+    cause: Condition | None = None  # condition that asked for the action
     pending: Action = Action.NONE  # what follows the hold that gives the pilot time
     due_us: int = 0  # when
     overridden: tuple[Condition, ...] = ()  # whose actions a command of the pilot has put aside

@@ -54,7 +54,8 @@ class Failsafe:
 
 
 _SLOWLY: Final = SLOW_US + AT_ONCE_US
-_TWICE: Final = 2 * SLOW_US + AT_ONCE_US  # found in a planning tick, looked at up to a period later
+# What a planning tick finds, its row looks at up to a period later.
+_TWICE: Final = 2 * SLOW_US + AT_ONCE_US
 # What rows have in common. Faults of the vehicle are told a planning period late at most.
 _fault = partial(Failsafe, of_vehicle=True, within_us=_SLOWLY)
 _in_flight = partial(_fault, in_flight=True)
@@ -434,8 +435,8 @@ def active(context: Situation) -> tuple[Failsafe, ...]:
     return tuple([row for row in FAILSAFES if (flies or not row.in_flight) and row.active(context)])
 
 
-def quickly_active(context: Situation) -> tuple[Failsafe, ...]:
-    """The same between two planning periods: the slow rows are as they were found last."""
+def active_between(context: Situation) -> tuple[Failsafe, ...]:
+    """The same between planning periods: quick rows as they are now, slow ones as found last."""
     vehicle = context.state.vehicle
     before, flies = vehicle.conditions, vehicle.flies
     found = []

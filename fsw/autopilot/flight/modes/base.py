@@ -52,7 +52,7 @@ class Handover:
     """How one mode takes over from another."""
 
     reference: EndEffectorTarget  # of the mode that is left, now
-    completed: bool  # that mode was done; it was neither commanded nor a failsafe
+    completed: bool  # that mode was done; the change was neither commanded nor a failsafe's
 
 
 class FlightMode:

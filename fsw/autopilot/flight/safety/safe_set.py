@@ -1,4 +1,4 @@
-"""Which safe set is in force: the announced one and the fence together, if they can be kept.
+"""Which safe set is in force: the announced one and the geofence together, if they can be kept.
 
 One source owns what is announced, the first or the configured one, and one the fence that is in
 force; nobody owns what never was. In flight any source may shrink either, and only its owner may

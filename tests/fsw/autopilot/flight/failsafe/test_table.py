@@ -13,7 +13,7 @@ from fsw.autopilot.estimation.faults.sensor_fault import SensorFault
 from fsw.autopilot.flight.failsafe.conditions import Action, Condition
 from fsw.autopilot.flight.failsafe.evidence import way_home_s
 from fsw.autopilot.flight.failsafe.response import report
-from fsw.autopilot.flight.failsafe.table import FAILSAFES, FAULTS, ROWS, active, quickly_active
+from fsw.autopilot.flight.failsafe.table import FAILSAFES, FAULTS, ROWS, active, active_between
 from fsw.autopilot.flight.safety.uncertain_clearance import InflatedSafeSet
 from fsw.autopilot.flight.situation import Situation
 from fsw.autopilot.flight.state import (
@@ -558,9 +558,9 @@ def test_between_two_planning_periods_slow_rows_are_as_they_were_found_last() ->
         battery=charged(BatteryWarning.LOW),
         known=(Condition.ZONES_SILENT, Condition.TUBE_LEFT),
     )
-    found = [row.condition for row in quickly_active(evidence.context())]
+    found = [row.condition for row in active_between(evidence.context())]
     assert found == [Condition.OUTPUT_NOT_FINITE, Condition.ZONES_SILENT]
-    assert quickly_active(FINE.context()) == ()
+    assert active_between(FINE.context()) == ()
 
 
 QUICK = {row.condition for row in FAILSAFES if not row.slow}
@@ -590,7 +590,7 @@ ALARMING = (
 def test_every_quick_row_is_asked_between_two_planning_periods() -> None:
     found: set[Condition] = set()
     for evidence in ALARMING:
-        rows = quickly_active(replace(evidence, known=()).context())
+        rows = active_between(replace(evidence, known=()).context())
         found |= {row.condition for row in rows}
     assert found >= QUICK - {Condition.SETPOINTS_LOST}
 
