@@ -251,21 +251,10 @@ class Autopilot:
         What it finds out is acted upon in the next tick.
         """
         # All fields, in their order: eight of them by name would take 0.15 us longer.
-        (
-            outputs,
-            inputs,
-            state,
-            r,
-            at_command,
-            fusion,
-            flown,
-            plan,
-            ticks,
-            replaced,
-            caught,
-            calm,
-        ) = controlled
-        texts, safety, reset, estimate = outputs.texts, state.safety, None, at_command
+        outputs, inputs, state, r, before, fusion, flown, plan, ticks, replaced, known, calm = (
+            controlled
+        )
+        texts, safety, reset, estimate = outputs.texts, state.safety, None, before
         flags = r.flags if flown and not calm else 0  # a calm tick has none
         if estimate is not None and (flags & OFF_PLAN or safety.off_plan_us >= 0):
             safety = self._watch.off_plan(
@@ -277,7 +266,7 @@ class Autopilot:
             )
         if fusion is not None and not (calm and self._sensed.rests(state, fusion, inputs)):
             estimate = r.state_estimate if calm else estimate
-            caught = caught or self._sensed.catch_up(state, fusion, estimate, inputs)
+            caught = known or self._sensed.catch_up(state, fusion, estimate, inputs)
             fusion, found, reset, said = caught
             texts = (*texts, *said) if said else texts
             if reset is not None:
@@ -285,13 +274,13 @@ class Autopilot:
             if found is not None and found is not estimate:
                 r.state_estimate = found
             estimate = found
-        if calm and texts is outputs.texts and reset is None:  # here a calm tick ends
+        if calm and texts is outputs.texts and reset is None:  # all that is left to do is little
             damage = state.damage if fusion is None else self._see_damage(state, r, controlled)
             state = self.calm.after(state, r, fusion)
             if damage is not state.damage:
                 state = replace(state, damage=damage)
             return state, replace(outputs, shown=Shown(state, inputs.sensors))
-        if estimate is None or (at_command is None and not calm):
+        if estimate is None or (before is None and not calm):
             # Ticks are counted from the first estimate on; what looks now and then goes by time.
             t_us = inputs.sensors.t_us
             unknown = nothing_known(outputs, state, t_us, texts)
