@@ -18,6 +18,7 @@ from fsw.autopilot.control.braking import Brake
 from fsw.autopilot.flight.modes.base import FlightMode, ModeResult, Px4Mode, touch_down
 from fsw.autopilot.flight.safety.retreat import retreat_place
 from fsw.autopilot.flight.setpoints.generator import PositionGoal
+from fsw.autopilot.flight.setpoints.reference_governor import max_lead
 from fsw.autopilot.flight.state import Aiding, FlightState, SetpointMemory
 from fsw.autopilot.geometry.vectors import clamp_magnitude
 from fsw.autopilot.model.nominal import NominalModel
@@ -130,6 +131,10 @@ class Descent:
                 across = self._back(height, estimate, aiding, place)
         for _ in range(ticks):
             nominal = self._model.advance(nominal, self._input(nominal, speed, most, across))
+        # What holds the vehicle up may go away: the plan waits for it.
+        (px, py, pz), lowest = nominal.p, estimate.p_WB[2] + max_lead(speed)
+        if pz > lowest:
+            nominal = nominal._replace(p=(px, py, lowest))
         if blind:
             (x, y, _), (_, _, z) = estimate.p_WB, nominal.p
             nominal = nominal._replace(p=(x, y, z))

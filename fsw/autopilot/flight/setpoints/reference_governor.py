@@ -12,6 +12,7 @@ from outside: streamed        ``limit_horizon``: near the vehicle's own motion, 
 targets, mission, setpoints   wall and not fast towards one; streamed targets and missions no
                               faster than a setpoint, between the lowest and the highest height
 a place of a mission          ``project``: the nearest place inside
+a takeoff's, a landing's      ``max_lead``: waits for a vehicle that is held up
 ============================  =====================================================
 
 Source: docs/decisions/0010-setpoints-through-the-planner.md.
@@ -43,6 +44,7 @@ _LEAD_GROWTH = 0.4  # m/s, by which that grows over the horizon
 _MAX_VELOCITY_ERROR = 1.0  # m/s; more makes the planned arm wind up
 _MAX_DEPTH = 0.1  # m behind the clearance; the paper's path goes 0.03 m deep
 _NEAR = 0.1  # m, that a reference may be ahead of a vehicle at the largest speed
+_LAG = 0.3  # s, that a vehicle may be behind what moves on; it takes off 0.22 s behind
 _ALWAYS = 0.5  # m/s towards a wall, half of what the penalty of a row stands
 _PROJECTIONS = 30  # one after the other; in a corner they have to settle
 _TOLERANCE = 1e-4  # m
@@ -73,6 +75,11 @@ def lead_at(v: Vec3, fastest: float) -> float:
     One that is led by as much at any speed would be led to any speed.
     """
     return max(_MAX_LEAD_DISTANCE * max(1.0 - norm(v) / fastest, 0.0), _NEAR)
+
+
+def max_lead(speed: float) -> float:
+    """How far [m] what moves at a ``speed`` [m/s] may lead the vehicle before it waits for it."""
+    return _NEAR + _LAG * speed
 
 
 def limit_approach(

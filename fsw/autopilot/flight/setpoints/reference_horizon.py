@@ -8,9 +8,14 @@ from fsw.autopilot.control.press import PressTuning
 from fsw.autopilot.flight.land_detector import is_low
 from fsw.autopilot.flight.modes.base import FlightMode
 from fsw.autopilot.flight.setpoints.generator import PositionGoal, ReferenceState, arrived
-from fsw.autopilot.flight.setpoints.reference_governor import Limits, ReferenceGovernor, lead_at
+from fsw.autopilot.flight.setpoints.reference_governor import (
+    Limits,
+    ReferenceGovernor,
+    lead_at,
+    max_lead,
+)
 from fsw.autopilot.flight.state import FlightState, SetpointMemory
-from fsw.autopilot.geometry.vectors import add_scaled, clamp, dot, subtract
+from fsw.autopilot.geometry.vectors import add_scaled, clamp, dot, norm, subtract
 from fsw.autopilot.model.kinematics import end_effector
 from fsw.autopilot.mpc.reference import still_at
 from fsw.autopilot.parameters.flight_config import FlightConfig
@@ -54,16 +59,19 @@ class ReferenceHorizon:
         """Move the mode's setpoint on by a planning period; its horizon from ``t_us`` on."""
         state = mode.aim(state, estimate)
         reference, goal = state.setpoint.reference, state.setpoint.goal
+        p_WE, v_WE = end_effector(self._config.airframe.bodies, estimate)
         if reference is not None and goal is not None:
             state, (targets, joints) = self._generated(mode, state, reference, goal, estimate, t_us)
         else:
             nodes, period_us = self._config.planner.horizon + 1, self._config.mpc_period_us
+            if _leads_too_far(mode.target(state, t_us), p_WE):  # its time stands still
+                begin_us = state.vehicle.mode_begin_us + period_us
+                state = replace(state, vehicle=replace(state.vehicle, mode_begin_us=begin_us))
             targets = tuple(mode.target(state, t_us + node * period_us) for node in range(nodes))
             joints = ()
         balance = state.damage.balance
         if balance is not None:
             joints = (balance,) * len(targets)
-        p_WE, v_WE = end_effector(self._config.airframe.bodies, estimate)
         if not mode.external_reference and (reference is None or goal is None):
             targets = _led_aside(targets, p_WE, v_WE, self._config.steering.speed)
             return replace(state, limited="") if state.limited else state, (targets, joints)
@@ -141,6 +149,15 @@ class ReferenceHorizon:
         (x, y, z), (px, py, pz) = estimate.p_WB, nominal.p
         low = is_low(self._config, estimate)
         return math.hypot(px - x, py - y, 0.0 if low else pz - z) > _OFF_PLAN
+
+
+def _leads_too_far(target: EndEffectorTarget, p_WE: Vec3) -> bool:
+    """Whether a target moves on too far ahead of the end-effector at ``p_WE`` [m, NED].
+
+    What holds the vehicle up may go away, and a reference that had gone on would be caught up with.
+    """
+    ahead, speed = dot(subtract(target.p_WE, p_WE), target.v_WE), norm(target.v_WE)
+    return ahead > speed * max_lead(speed)
 
 
 def _led_aside(

@@ -61,6 +61,15 @@ def test_it_brakes_across_and_sinks_at_the_speed_of_landing_and_faster_in_a_hurr
     assert vz == pytest.approx(times * LIMITS.land_speed, abs=1e-3)
 
 
+def test_it_waits_for_a_vehicle_that_is_held_up() -> None:
+    """Flown: held up by a zone for 14 s, it hit the ground at 3.8 m/s once that was gone."""
+    nominal = nominal_at_rest(HERE)
+    for _ in range(5000):
+        nominal, _ = DESCENT.step(nominal, HERE, AIDED, 1)
+    assert 0.1 < nominal.p[2] - HIGH[2] < 0.3
+    assert nominal.v[2] == pytest.approx(LIMITS.land_speed, abs=1e-3)
+
+
 @pytest.mark.drawn(3)
 @pytest.mark.parametrize(
     ("height", "sigma", "speed"),

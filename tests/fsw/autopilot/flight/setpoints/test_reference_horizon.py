@@ -9,6 +9,7 @@ import pytest
 
 from fsw.autopilot.flight.modes.base import FlightMode, Px4Mode
 from fsw.autopilot.flight.modes.hold import Hold
+from fsw.autopilot.flight.modes.land import Land
 from fsw.autopilot.flight.modes.mission import Mission
 from fsw.autopilot.flight.modes.takeoff import Takeoff
 from fsw.autopilot.flight.modes.trajectory import Trajectory
@@ -193,6 +194,24 @@ def test_no_mode_is_led_far_away_at_once(mode: type[FlightMode]) -> None:
     state = replace(state, mission=replace(state.mission, stream=(far,)))
     _, (targets, _) = HORIZON(mode(CONFIG), state, estimate, 0)
     assert math.dist(targets[0].p_WE, estimate.p_WB) < 1.0
+
+
+@pytest.mark.parametrize("mode", [Land, Takeoff])
+def test_what_moves_on_by_itself_waits_for_a_vehicle_that_is_held_up(
+    mode: type[FlightMode],
+) -> None:
+    """Flown: a landing went on below a zone for 14 s, and was caught up with at 2.6 m/s."""
+    estimate = vehicle_at(HERE)
+    origin, _ = end_effector(CONFIG.airframe.bodies, estimate)
+    state, flown = flying(mode.mode, mode_origin=origin, climb=50.0), mode(CONFIG)
+    for t_us in range(0, 14_000_000, CONFIG.mpc_period_us):
+        before = state
+        state, (targets, _) = HORIZON(flown, state, estimate, t_us)
+        if t_us < 300_000:
+            assert state is before, "a vehicle that only lags is not waited for"
+    assert 0.1 < math.dist(targets[0].p_WE, origin) < 0.3
+    assert math.hypot(*targets[0].v_WE) > 0.0, "it goes on as soon as it can"
+    assert flown.update(state, vehicle_at(HERE, t_us=t_us))[1].next_mode is None
 
 
 @pytest.mark.parametrize("mode", [Hold, Trajectory, Takeoff])
