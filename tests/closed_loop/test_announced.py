@@ -13,6 +13,7 @@ import pytest
 
 from fsw.autopilot.parameters.flight_config import lowest_height
 from fsw.autopilot.shapes.ball import ball, point
+from fsw.autopilot.shapes.box import box
 from fsw.autopilot.shapes.half_space import half_space, wall
 from fsw.autopilot.shapes.target_sphere import target_sphere
 from fsw.autopilot.signals import (
@@ -29,6 +30,7 @@ from fsw.autopilot.signals import (
 from sitl.simulation import START_US
 from tests.closed_loop.harness import ARM, LAND, SET_MODE, Flight, command, hover
 
+GOTO, RETURN = 192, 20
 F32MAX = 3.4028234663852886e38
 STRANGER = MessageSource(66, 6, "gcs", "127.0.0.1:5555")
 REST: Vec3 = (0.0, 0.0, 0.0)
@@ -156,6 +158,30 @@ def test_targets_below_the_ground_or_far_away_are_limited_and_told(
     fast = streamed(flight, moved, 2.0, 2.0 + lasts_s, 12.0)
     assert fast < 1.15 * flight.config.steering.speed
     assert any(text.startswith("reference limited: ") for text in flight.texts), flight.texts
+
+
+@pytest.mark.parametrize("mode", [Mode.HOLD, Mode.RETURN, Mode.LAND])
+def test_a_mode_whose_way_is_blocked_says_by_what(mode: Mode) -> None:
+    """Flown: a return stood before a wall, and said nothing."""
+    flight = hovering()
+    flight.run(0.5)
+    x, y, z = flight.sim.truth().p_WB
+    if mode is Mode.LAND:
+        in_the_way, order = box((x, y, -0.3), (1.0, 1.0, 0.3)), command(LAND)
+    else:
+        flight.step(command(GOTO, -1.0, 1.0, 0.0, math.nan, x - 3.0, y, z, frame=1))
+        flight.run(8.0)
+        in_the_way = box((x - 1.5, y, z), (0.1, 3.0, 3.0))
+        order = command(RETURN)
+        if mode is Mode.HOLD:
+            order = command(GOTO, -1.0, 1.0, 0.0, math.nan, x, y, z, frame=1)
+    zones = flight.state.mission.announced.zones
+    tell(flight, SafeSet((*zones, Zone(in_the_way, 0.1))))
+    flight.step(order)
+    flight.run(16.0)
+    assert flight.mode is mode
+    said = [text for text in flight.texts if text.startswith("no progress: ")]
+    assert said == [f"no progress: blocked by zone {len(zones) + 1} (box)"]
 
 
 @pytest.mark.drawn(1)

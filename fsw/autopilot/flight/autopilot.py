@@ -40,6 +40,7 @@ from fsw.autopilot.flight.plan_exchange import (
 from fsw.autopilot.flight.restart import restarted
 from fsw.autopilot.flight.safety.accuracy_watch import AccuracyMemory, AccuracyWatch
 from fsw.autopilot.flight.safety.damage_watch import DamageWatch
+from fsw.autopilot.flight.safety.progress_watch import see_progress
 from fsw.autopilot.flight.safety.retreat import retreat_place
 from fsw.autopilot.flight.safety.safe_set import SafeSetCheck
 from fsw.autopilot.flight.safety.safety_watch import SafetyWatch
@@ -494,6 +495,10 @@ class Autopilot:
         state, (targets, joints) = self._horizon(mode, state, estimate, apply_us)
         if state.limited and state.limited != limited:
             texts.append(StatusText(Severity.WARNING, f"reference limited: {state.limited}"))
+        asked = self._horizon.asked(mode, state, estimate, apply_us)
+        progress = see_progress(
+            *(state.progress, asked, config.body, state.kept.safe_set, estimate, texts)
+        )
         p_WE, _ = end_effector(config.airframe.bodies, estimate)
         targets, pushes = pressed_reference(targets, state.record, p_WE, config.tuning.press)
         plan, safety = state.plan, state.safety
@@ -518,7 +523,8 @@ class Autopilot:
             turned = math.degrees(abs(wrap_angle(nominal.yaw - measured.yaw)))
             what = f"off the plan by {away:.0f} mm and {turned:.0f} deg: replanning"
             texts.append(StatusText(Severity.WARNING, what))
-        return replace(state, plan=requested(plan, apply_us), safety=safety), request
+        plan = requested(plan, apply_us)
+        return replace(state, plan=plan, safety=safety, progress=progress), request
 
     def _see_accuracy(
         self,

@@ -25,6 +25,7 @@ from fsw.autopilot.flight.modes.mission import left as mission_left
 from fsw.autopilot.flight.modes.mission import with_update
 from fsw.autopilot.flight.plan_exchange import without_plan
 from fsw.autopilot.flight.safety import way_home
+from fsw.autopilot.flight.safety.progress_watch import ProgressMemory
 from fsw.autopilot.flight.safety.retreat import retreat_place
 from fsw.autopilot.flight.safety.zone_room import within_room
 from fsw.autopilot.flight.setpoints.generator import PositionGoal, SetpointGenerator
@@ -394,7 +395,8 @@ class Commander:
             vehicle = replace(vehicle, failsafe_from=None, failsafe=memory)
             # On the ground another source may own the safe set from now on.
             state = replace(state, mission=replace(state.mission, owner_heard_us=-1))
-        return replace(state, vehicle=vehicle)
+        progress = ProgressMemory(estimate.p_WB, estimate.t_us)
+        return replace(state, vehicle=vehicle, progress=progress)
 
 
 def acknowledgement(command: Command, result: int) -> CommandAck:

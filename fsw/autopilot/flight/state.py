@@ -12,6 +12,7 @@ from fsw.autopilot.flight.commands.dedup import Answers
 from fsw.autopilot.flight.failsafe.conditions import Condition, FailsafeMemory
 from fsw.autopilot.flight.mission.sequencer import MissionFlight
 from fsw.autopilot.flight.safety.accuracy_watch import AccuracyMemory
+from fsw.autopilot.flight.safety.progress_watch import ProgressMemory
 from fsw.autopilot.flight.safety.uncertain_clearance import InflatedSafeSet
 from fsw.autopilot.flight.setpoints.generator import PositionGoal, ReferenceState
 from fsw.autopilot.flight.setpoints.offboard_setpoint import Tilt
@@ -313,6 +314,7 @@ class FlightState:
     accuracy: AccuracyMemory = AccuracyMemory()  # of the estimate, until it is told
     host: HostHealth = field(default_factory=HostHealth)
     damage: Damage = Damage()
+    progress: ProgressMemory = ProgressMemory()
     limited: str = ""  # why the reference is not what was asked for; empty: it is
 
     @property

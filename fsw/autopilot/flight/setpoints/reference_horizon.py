@@ -7,7 +7,7 @@ import math
 from fsw.autopilot.control.press import PressTuning
 from fsw.autopilot.flight.land_detector import is_low
 from fsw.autopilot.flight.modes.base import FlightMode
-from fsw.autopilot.flight.setpoints.generator import PositionGoal, ReferenceState, arrived
+from fsw.autopilot.flight.setpoints.generator import PositionGoal, ReferenceState, arrived, step
 from fsw.autopilot.flight.setpoints.reference_governor import (
     Limits,
     ReferenceGovernor,
@@ -30,6 +30,7 @@ from fsw.autopilot.signals import (
 from fsw.autopilot.tick_record import Tick
 from fsw.frozen import replace
 
+_AHEAD_US = 1_000_000
 _OFF_PLAN = 0.05  # m; beyond what a disturbance alone does nearly always
 # m, that a surface is followed from where it was announced: one that comes as far as it does, one
 # that goes not far, because the other parts keep clear of where it was announced
@@ -101,6 +102,20 @@ class ReferenceHorizon:
         p_WE, v_WE = end_effector(self._config.airframe.bodies, estimate)
         _, limits = self._came_up(state, target)
         return self._governor.limit_now(target, p_WE, v_WE, state.kept.safe_set, limits)
+
+    def asked(
+        self, mode: FlightMode, state: FlightState, estimate: StateEstimate, t_us: int
+    ) -> Vec3:
+        """The way [m, NED] from the vehicle to where a mode wants it a second after an instant.
+
+        As if there were no walls.
+        """
+        reference, goal = state.setpoint.reference, state.setpoint.goal
+        p_WE, _ = end_effector(self._config.airframe.bodies, estimate)
+        if reference is None or goal is None:
+            return subtract(mode.target(state, t_us + _AHEAD_US).p_WE, p_WE)
+        wanted = step(reference, mode.guided(goal, state), self._config.steering, 1e-6 * _AHEAD_US)
+        return subtract(wanted.p, p_WE if reference.of_end_effector else estimate.p_WB)
 
     def here(self, estimate: StateEstimate, t_us: int) -> EndEffectorTarget:
         """At rest where the end-effector is, from ``t_us`` [us] on."""
