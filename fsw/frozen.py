@@ -7,7 +7,29 @@ against 0.16 us here. Such values must not be changed all the same; mypy, which 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from functools import lru_cache
+from typing import TYPE_CHECKING, Generic, TypeVar
+
+V = TypeVar("V")
+M = TypeVar("M")
+
+
+class Remembered(Generic[V, M]):
+    """What a function makes of frozen values; the last one is known by ``is``.
+
+    A hash of 64 zones takes 30 us, ten times as long as what is asked of one of them.
+    """
+
+    def __init__(self, make: Callable[[V], M]) -> None:
+        self._make, self._last = lru_cache(maxsize=16)(make), list[tuple[V, M]]()
+
+    def __call__(self, value: V) -> M:
+        """What it has made of a value, or makes."""
+        if not (self._last and self._last[0][0] is value):
+            self._last = [(value, self._make(value))]
+        return self._last[0][1]
+
 
 if TYPE_CHECKING:
     from dataclasses import dataclass as dataclass

@@ -26,6 +26,8 @@ from fsw.autopilot.model.airframe import Airframe
 from fsw.autopilot.model.multibody import Bodies
 from fsw.autopilot.model.parts import ON_BASE, Part
 from fsw.autopilot.signals import Vec3
+from fsw.compiled import kernel, machine_code
+from fsw.frozen import Remembered
 
 BodyName = Literal["points", "full"]
 BODIES: Final[tuple[BodyName, ...]] = ("points", "full")
@@ -43,6 +45,11 @@ before it are not."""
 
 Probes = NDArray[np.float64]
 """A row a probe (probes, 14) [SI], with those columns."""
+
+
+Hull = NDArray[np.float64]
+"""A row a place (places, 3) [m]: a radius, how far it is off the vertical axis, and how low."""
+NO_HULL: Final[Hull] = np.zeros((1, 3))
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,15 +109,34 @@ def body_of(name: BodyName, airframe: Airframe) -> Body:
     return Body(name, airframe.points if name == "points" else airframe.parts)
 
 
+@Remembered
+def hull_of(body: Body) -> Hull:
+    """The base and what is rigid on it."""
+    return np.array(
+        [
+            (part.radius, math.hypot(x, y) + part.rim, z)
+            for part in body.parts
+            if part.on == ON_BASE
+            for x, y, z in (part.begin, part.end or part.begin)
+        ]
+    )
+
+
+@kernel
+def hull_reach_at(hull: Hull, normal: Vec3) -> float:
+    """``hull_reach`` of a ``hull`` (places, 3) [m], against a ``normal`` [1, NED]."""
+    level, reach = math.hypot(normal[0], normal[1]), -math.inf
+    for k in range(len(hull)):
+        reach = max(reach, hull[k, 0] + level * hull[k, 1] - normal[2] * hull[k, 2])
+    return reach
+
+
+_hull_reach = machine_code(hull_reach_at, NO_HULL, (0.0, 0.0, 1.0))
+
+
 def hull_reach(body: Body, normal: Vec3) -> float:
     """How far the base and what is rigid on it reach against a ``normal`` [1, NED], level [m].
 
     Whatever the yaw is; 0 for a body of points.
     """
-    level = math.hypot(normal[0], normal[1])
-    return max(
-        part.radius + level * (math.hypot(x, y) + part.rim) - normal[2] * z
-        for part in body.parts
-        if part.on == ON_BASE
-        for x, y, z in (part.begin, part.end or part.begin)
-    )
+    return _hull_reach(hull_of(body), normal)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 import numpy as np
 from numba import literal_unroll
 from numpy.typing import NDArray
@@ -13,6 +11,7 @@ from fsw.autopilot.shapes import BY_NAME, KINDS
 from fsw.autopilot.shapes.kind import NUMBERS, Surface
 from fsw.autopilot.signals import EndEffectorTarget, SafeSet, Vec3
 from fsw.compiled import compilable, kernel, machine_code
+from fsw.frozen import Remembered
 
 Array = NDArray[np.float64]
 Zones = Array
@@ -37,7 +36,7 @@ _COLUMNS = ADDED + 1
 NO_ZONES: Array = np.zeros((0, _COLUMNS))
 
 
-@lru_cache(maxsize=16)
+@Remembered
 def zone_arrays(safe_set: SafeSet) -> Array:
     """A safe set as rows of numbers (zones, FIRST + 16), for kernels."""
     rows = np.zeros((len(safe_set.zones), FIRST + NUMBERS))

@@ -22,18 +22,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from functools import cache, lru_cache
+from functools import cache
 
 from fsw.autopilot.barriers.safe_approach import BarrierTuning, safe_approach_speed
 from fsw.autopilot.flight.setpoints.offboard_setpoint import finite_or_zero
 from fsw.autopilot.geometry.vectors import add_scaled, dot, limit_norm, norm, subtract
-from fsw.autopilot.model.body import Body, hull_reach
+from fsw.autopilot.model.body import NO_HULL, Hull, hull_of, hull_reach_at
 from fsw.autopilot.parameters.flight_config import FlightConfig, lowest_height
 from fsw.autopilot.shapes.kind import Surface
-from fsw.autopilot.shapes.zones import NO_ZONES, Array, moving_zones, nearest_plane, surface
+from fsw.autopilot.shapes.zones import FORCE_MAX, NO_ZONES, Array, moving_zones, nearest_plane
 from fsw.autopilot.signals import EndEffectorTarget, MotionSetpoint, SafeSet, Vec3
 from fsw.compiled import compilable, kernel, machine_code
-from fsw.frozen import replace
+from fsw.frozen import Remembered, replace
 
 SETTLE_RATE = 2.0  # 1/s, of the last bit of the way
 _GROUND_BRAKING = 1.0  # m/s^2
@@ -82,31 +82,51 @@ def max_lead(speed: float) -> float:
     return _NEAR + _LAG * speed
 
 
+@kernel
+def _approached(
+    zones: Array,
+    t_us: int,
+    p: Vec3,
+    v: Vec3,
+    ends: tuple[Vec3, Vec3],
+    hulls: tuple[Hull, Hull],
+    alpha: float,
+    slope: float,
+) -> tuple[Vec3, Vec3]:
+    for zone in range(len(zones)):
+        for k in range(2):
+            at = nearest_plane(zones, zone, add_scaled(p, ends[k], 1.0), t_us)
+            n = (at.nx, at.ny, at.nz)
+            distance = at.distance - hull_reach_at(hulls[k], n)
+            if distance < 0.0:
+                p = add_scaled(p, n, -distance)
+            v = _slowed(v, n, safe_approach_speed(max(distance, 0.0), alpha, slope))
+    return p, v
+
+
 def limit_approach(
     p: Vec3,
     v: Vec3,
-    ends: tuple[tuple[Vec3, Body | None], ...],
+    ends: tuple[Vec3, Vec3],
+    hulls: tuple[Hull, Hull],
     safe_set: SafeSet,
     t_us: int,
     barrier: BarrierTuning,
 ) -> tuple[Vec3, Vec3]:
     """``p`` [m, NED] off every zone, and its ``v`` [m/s, NED] such that it can stop.
 
-    Both ``ends`` of the arm [m, NED], as seen from the point, stay out as well, one of them with
-    the body around it. A sphere rides on the reference and needs nothing.
+    Both ``ends`` of the arm [m, NED], as seen from the point, stay out as well, with the ``hulls``
+    (places, 3) [m] around them. A sphere rides on the reference and needs nothing.
     """
-    for zone in range(len(safe_set.zones)):
-        for end, body in ends:
-            at = surface(safe_set, zone, add_scaled(p, end, 1.0), t_us)
-            if at is None:
-                continue
-            n = at.normal
-            distance = at.distance - (0.0 if body is None else hull_reach(body, n))
-            if distance < 0.0:
-                p = add_scaled(p, n, -distance)
-            room = max(distance, 0.0)
-            v = _slowed(v, n, safe_approach_speed(room, barrier.alpha, barrier.slope))
-    return p, v
+    zones, tuning = _moving_zones(safe_set), (barrier.alpha, barrier.slope)
+    return _approach()(zones, t_us, p, v, ends, hulls, *tuning)
+
+
+@cache
+def _approach() -> Callable[..., tuple[Vec3, Vec3]]:
+    """``_approached``, compiled when it is first wanted."""
+    ends, hulls = (_HERE, _HERE), (NO_HULL, NO_HULL)
+    return machine_code(_approached, NO_ZONES, 0, _HERE, _HERE, ends, hulls, 1.0, 1.0)
 
 
 @compilable
@@ -184,7 +204,7 @@ def _limit_target() -> Callable[..., tuple[Vec3, Vec3, int]]:
     return machine_code(_limited, NO_ZONES, 0, 0, _HERE, _HERE, _HERE, _HERE, 1.0, 1.0, UNLIMITED)
 
 
-@lru_cache(maxsize=16)
+@Remembered
 def _moving_zones(safe_set: SafeSet) -> Array:
     """The zones that a reference keeps off: a sphere rides on it."""
     return moving_zones(safe_set, None)
@@ -201,15 +221,27 @@ def project_to_safe_set(p: Vec3, safe_set: SafeSet, t_us: int, *, touches: bool 
 
     Of a tool that ``touches`` what may be touched, of every other zone.
     """
+    return _project()(_moving_zones(safe_set), t_us, p, float(touches))
+
+
+@kernel
+def _projected(zones: Array, t_us: int, p: Vec3, touches: float) -> Vec3:
     for _ in range(_PROJECTIONS):
-        moved = p
-        for zone, of in enumerate(safe_set.zones):
-            at = None if touches and of.touch else surface(safe_set, zone, p, t_us)
-            if at is not None and -at.distance > _TOLERANCE:
-                p = add_scaled(p, at.normal, -at.distance)
-        if p is moved:
+        moved = False
+        for zone in range(len(zones)):
+            at = nearest_plane(zones, zone, p, t_us)
+            may_touch = touches > 0.0 and zones[zone, FORCE_MAX] > 0.0
+            if -at.distance > _TOLERANCE and not may_touch:
+                p, moved = add_scaled(p, (at.nx, at.ny, at.nz), -at.distance), True
+        if not moved:
             break
     return p
+
+
+@cache
+def _project() -> Callable[..., Vec3]:
+    """``_projected``, compiled when it is first wanted."""
+    return machine_code(_projected, NO_ZONES, 0, _HERE, 0.0)
 
 
 def project(
@@ -220,7 +252,7 @@ def project(
     A tool that ``touches`` goes up to what may be touched.
     """
     p = project_to_safe_set(target.p_WE, safe_set, target.t_us, touches=touches)
-    if p is target.p_WE:
+    if p == target.p_WE:
         return target
     rest = (0.0, 0.0, 0.0)
     return replace(target, p_WE=p, v_WE=rest, a_WE=rest)
@@ -232,7 +264,7 @@ class ReferenceGovernor:
     def __init__(self, config: FlightConfig) -> None:
         self._config = config
         self._barrier = config.planner.walls
-        self._body = config.body
+        self._hulls = hull_of(config.body), NO_HULL
         # The arm hangs: the end-effector is that much lower than the base.
         lowest, highest = lowest_height(config), config.steering.highest
         self._hanging = hanging = config.surroundings.hanging
@@ -261,10 +293,8 @@ class ReferenceGovernor:
         if of_end_effector:  # a body may be asked down to the ground, to land
             height -= self._config.limits.airborne_height - _CLEAR_OF_GROUND
         p, v = limit_descent(p, v, height, touch_speed)
-        body, tip = (other_end, _HERE) if of_end_effector else (_HERE, other_end)
-        return limit_approach(
-            p, v, ((body, self._body), (tip, None)), safe_set, t_us, self._barrier
-        )
+        ends = (other_end, _HERE) if of_end_effector else (_HERE, other_end)
+        return limit_approach(p, v, ends, self._hulls, safe_set, t_us, self._barrier)
 
     def limit_horizon(
         self,

@@ -13,6 +13,7 @@ from fsw.autopilot.flight.setpoints.reference_governor import (
     ReferenceGovernor,
     lead_at,
     max_lead,
+    project,
 )
 from fsw.autopilot.flight.state import FlightState, SetpointMemory
 from fsw.autopilot.geometry.vectors import add_scaled, clamp, dot, norm, subtract
@@ -51,8 +52,12 @@ class ReferenceHorizon:
 
     def warm_up(self, estimate: StateEstimate) -> None:
         """Compile every kernel."""
-        here, rest = estimate.p_WB, (0.0, 0.0, 0.0)
-        self._governor.limit_horizon((still_at(here),), here, rest, SafeSet())
+        here, rest, nothing = estimate.p_WB, (0.0, 0.0, 0.0), SafeSet()
+        self._governor.limit_horizon((still_at(here),), here, rest, nothing)
+        self._governor.limit_setpoint(
+            here, rest, other_end=here, of_end_effector=False, safe_set=nothing, t_us=0
+        )
+        project(still_at(here), nothing)
 
     def __call__(
         self, mode: FlightMode, state: FlightState, estimate: StateEstimate, t_us: int

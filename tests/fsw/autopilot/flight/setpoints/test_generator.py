@@ -23,6 +23,7 @@ from fsw.autopilot.flight.setpoints.reference_governor import (
     limit_descent,
     limit_lead,
 )
+from fsw.autopilot.model.body import NO_HULL
 from fsw.autopilot.parameters.flight_config import SetpointLimits, flight_config
 from fsw.autopilot.shapes.ball import point
 from fsw.autopilot.shapes.half_space import wall
@@ -134,8 +135,8 @@ def test_whatever_is_asked_for_speed_and_acceleration_stay_within_limits(
 def limited(
     lead: ReferenceState, other_end: Vec3, safe_set: SafeSet, barrier: BarrierTuning
 ) -> ReferenceState:
-    ends = (((0.0, 0.0, 0.0), None), (other_end, None))
-    p, v = limit_approach(lead.p, lead.v, ends, safe_set, 0, barrier)
+    ends, hulls = ((0.0, 0.0, 0.0), other_end), (NO_HULL, NO_HULL)
+    p, v = limit_approach(lead.p, lead.v, ends, hulls, safe_set, 0, barrier)
     return replace(lead, p=p, v=v)
 
 
