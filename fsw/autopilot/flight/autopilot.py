@@ -20,6 +20,7 @@ from fsw.autopilot.estimation.estimator import estimate_state
 from fsw.autopilot.estimation.fusion_memory import FusionMemory
 from fsw.autopilot.flight.calm_tick import CalmTick
 from fsw.autopilot.flight.commander import Commander
+from fsw.autopilot.flight.commands.circle_room import circle_too_close
 from fsw.autopilot.flight.estimate.before_estimate import nothing_known, nowhere, told
 from fsw.autopilot.flight.estimate.exact_state import ExactState
 from fsw.autopilot.flight.estimate.jump import all_along
@@ -58,6 +59,7 @@ from fsw.autopilot.geometry.rotation import wrap_angle
 from fsw.autopilot.measurements import RangeSample, Sensor
 from fsw.autopilot.model.actuator_health import SOUND
 from fsw.autopilot.model.battery import corrected, drained
+from fsw.autopilot.model.body import hull_reach
 from fsw.autopilot.model.kinematics import end_effector
 from fsw.autopilot.model.nominal import rest_input
 from fsw.autopilot.model.rotors import is_light
@@ -167,6 +169,8 @@ class Autopilot:
         self._clearance.warm_up(estimate)
         end_effector(self.config.airframe.bodies, estimate)
         retreat_place(self.config, SafeSet(()), estimate, 0.0)
+        hull_reach(self.config.body, (0.0, 0.0, 1.0))
+        circle_too_close(estimate.p_WB, 1.0, SafeSet(()), self.config.body, estimate.t_us)
 
     def analyse(self, safe_set: SafeSet) -> tuple[Finding, ...]:
         """Findings on whether this configuration can keep a safe set."""

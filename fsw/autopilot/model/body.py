@@ -131,7 +131,7 @@ def hull_reach_at(hull: Hull, normal: Vec3) -> float:
     return reach
 
 
-_hull_reach = machine_code(hull_reach_at, NO_HULL, (0.0, 0.0, 1.0))
+_hull_reach = machine_code(hull_reach_at)
 
 
 def hull_reach(body: Body, normal: Vec3) -> float:

@@ -9,6 +9,7 @@ from typing import Any, Final
 
 from fsw.autopilot.flight.commands import arming
 from fsw.autopilot.flight.commands.bounds import GRIPPER_OF_PX4, motion_refusal, place_problem
+from fsw.autopilot.flight.commands.circle_room import circle_too_close
 from fsw.autopilot.flight.commands.dedup import COURSE
 from fsw.autopilot.flight.failsafe.table import BLOCKING
 from fsw.autopilot.flight.modes.base import FlightMode
@@ -54,7 +55,6 @@ from fsw.frozen import replace
 ACCEPTED, DENIED = CommandResult.ACCEPTED, CommandResult.DENIED
 LATER: Final = CommandResult.TEMPORARILY_REJECTED
 MIN_SPEED: Final = 0.01  # m/s
-_CIRCLE_PLACES: Final = 64  # looked at, before the nearest is sought
 _CLIMB_TOLERANCE: Final = 0.05  # m: a ground station rounds, and starts from its last altitude
 _SETTINGS: Final = ("home", "mission_step", "look_at", "speed", "gripper")  # of a decision
 
@@ -465,28 +465,11 @@ def _too_close(place: Vec3, context: Situation) -> str | None:
 
 
 def _circle_too_close(centre: Vec3, radius: float, context: Situation) -> str | None:
-    body, safe_set = context.config.body, context.mission.safe_set
-    up, down = hull_reach(body, (0.0, 0.0, -1.0)), hull_reach(body, (0.0, 0.0, 1.0))
-    farthest = radius + hull_reach(body, (1.0, 0.0, 0.0)) + max(up, down)
-    for number in range(len(safe_set.zones)):
-        middle = surface(safe_set, number, centre, context.estimate.t_us)
-        if middle is None or middle.distance > farthest:
-            continue  # no place on the circle is nearer by more than its radius
-
-        def room(angle: float, number: int = number) -> float:
-            x, y, z = centre
-            place = (x + radius * math.cos(angle), y + radius * math.sin(angle), z)
-            at = surface(safe_set, number, place, context.estimate.t_us)
-            return 1.0 if at is None else at.distance - hull_reach(body, at.normal)
-
-        # The nearest of some places on the circle, then of as many between its neighbours.
-        apart, best = math.pi, 0.0  # rad
-        for _ in range(2):
-            begin, apart = best - apart, 2.0 * apart / _CIRCLE_PLACES
-            best = min((begin + apart * k for k in range(_CIRCLE_PLACES + 1)), key=room)
-        if not room(best) > 0.0:
-            return f"the circle comes too close to zone {number + 1} of the safe set"
-    return None
+    about = context.mission.safe_set, context.config.body, context.estimate.t_us
+    number = circle_too_close(centre, radius, *about)
+    if number is None:
+        return None
+    return f"the circle comes too close to zone {number + 1} of the safe set"
 
 
 def _no_step(number: float, total: int) -> str:

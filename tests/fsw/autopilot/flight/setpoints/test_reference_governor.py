@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from time import perf_counter
 
 import pytest
 from hypothesis import given
@@ -15,9 +16,11 @@ from fsw.autopilot.flight.setpoints.reference_governor import (
     project_to_safe_set,
 )
 from fsw.autopilot.parameters.flight_config import flight_config, lowest_height
-from fsw.autopilot.shapes.ball import point
+from fsw.autopilot.shapes.ball import ball, point
 from fsw.autopilot.shapes.half_space import wall
-from fsw.autopilot.signals import EndEffectorTarget, MotionSetpoint, SafeSet, Vec3
+from fsw.autopilot.shapes.zones import surface
+from fsw.autopilot.signals import EndEffectorTarget, MotionSetpoint, SafeSet, Vec3, Zone
+from fsw.compiled import IN_PYTHON
 
 WALL = SafeSet((wall((-1.0, 0.0, 0.0), -1.0, 0.1),))
 STILL: Vec3 = (0.0, 0.0, 0.0)
@@ -265,3 +268,28 @@ def test_a_setpoint_is_held_against_the_same_limits(motion: MotionSetpoint, word
 def test_a_setpoint_goes_no_higher_than_the_highest_height() -> None:
     (_, _, z), (_, _, vz) = limited((0.0, 0.0, -HIGHEST - 3.0), (0.0, 0.0, -1.0))
     assert (z, vz) == (pytest.approx(-HIGHEST), 0.0)
+
+
+@pytest.mark.skipif(IN_PYTHON, reason="kernels as Python are as slow as it")
+def test_a_reference_among_sixty_four_zones_costs_little_more_than_beside_one() -> None:
+    """The hash of the set, once a zone, and Python made it 70 times as much: late ticks."""
+    governor = ReferenceGovernor(flight_config(body="full"))
+    near = tuple(Zone(ball((1.5 + 0.1 * k, 0.0, -1.0), 0.2), 0.1) for k in range(64))
+
+    def seconds(zones: tuple[Zone, ...]) -> float:
+        safe_set, took = SafeSet(zones), []
+        for _ in range(30):
+            begin = perf_counter()
+            governor.limit_setpoint(
+                *((0.0, 0.0, -1.0), (1.0, 0.0, 0.0)),
+                other_end=(0.0, 0.0, 0.2),
+                of_end_effector=False,
+                safe_set=safe_set,
+                t_us=0,
+            )
+            project_to_safe_set((0.0, 0.0, -1.0), safe_set, 0)
+            surface(safe_set, 0, (0.0, 0.0, -1.0), 0)
+            took.append(perf_counter() - begin)
+        return min(took)
+
+    assert seconds(near) < 10.0 * seconds(near[:1])
