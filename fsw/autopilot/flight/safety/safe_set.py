@@ -270,11 +270,12 @@ class SafeSetCheck:
             if against:
                 return against
         timeout = 1e-6 * self._config.limits.zone_timeout_us
+        in_force = frozenset(mission.safe_set.zones)
         inside = self._values(new, estimate, target)
         was = self._values(old, estimate, target) if is_update(old, new) else {}
         for number, (margin, h) in inside.items():
             zone = new.zones[number]
-            if zone in mission.safe_set.zones:
+            if zone in in_force:
                 continue
             which = f"zone {number + 1} ({zone.shape.kind})"
             moves_on = number in was and is_update_of(old.zones[number], zone)
