@@ -9,13 +9,15 @@ from fsw.autopilot.parameters.flight_config import FlightConfig
 from fsw.autopilot.parameters.registry import BY_NAME
 from fsw.autopilot.tuning import Tuning, tuned
 
-# What one parameter is to be of another.
-_ORDERED: tuple[tuple[str, str, str], ...] = (
-    ("BAT_CRIT_THR", "below", "BAT_LOW_THR"),
-    ("BAT_EMERGEN_THR", "below", "BAT_CRIT_THR"),
-    ("COM_POS_LOW_EPH", "at most", "COM_POS_FS_EPH"),
-    ("LND_HEIGHT", "at most", "LND_AIRBORNE"),
-    ("MIS_TAKEOFF_ALT", "at most", "TKO_CLIMB_MAX"),
+# What one parameter is to be of another, or of some times as much.
+_ORDERED: tuple[tuple[str, str, str, int], ...] = (
+    ("BAT_CRIT_THR", "below", "BAT_LOW_THR", 1),
+    ("BAT_EMERGEN_THR", "below", "BAT_CRIT_THR", 1),
+    ("COM_POS_LOW_EPH", "at most", "COM_POS_FS_EPH", 1),
+    ("LND_HEIGHT", "at most", "LND_AIRBORNE", 1),
+    ("MIS_TAKEOFF_ALT", "at most", "TKO_CLIMB_MAX", 1),
+    # A plan that may end at any speed damps nothing: from 60 times on the vehicle swings.
+    ("PLN_W_TRACK", "at most", "PLN_W_VEL_N", 20),
 )
 
 # Limits of roll and pitch [deg] beyond which the flight is ended; 0: none.
@@ -40,10 +42,11 @@ def agreed(config: FlightConfig, tuning: Tuning) -> FlightConfig:
 def contradictions(config: FlightConfig) -> tuple[str, ...]:
     """A sentence for each contradiction between parameters, or with what the vehicle does."""
     found = []
-    for lower, relation, upper in _ORDERED:
+    for lower, relation, upper, times in _ORDERED:
         less, more = BY_NAME[lower].read(config), BY_NAME[upper].read(config)
-        if not (less < more or (less == more and relation == "at most")):
-            found.append(f"{lower} {less:g} is to be {relation} {upper}, {more:g}")
+        if not (less < times * more or (less == times * more and relation == "at most")):
+            of = upper if times == 1 else f"{times} times {upper}"
+            found.append(f"{lower} {less:g} is to be {relation} {of}, {more:g}")
     return (*found, *_within_usual_tilt(config))
 
 

@@ -42,6 +42,20 @@ def test_a_contradiction_is_a_sentence_with_both_names(
     assert contradictions(replace(config, limits=replace(CONFIG.limits, position_low=0.5))) == ()
 
 
+@pytest.mark.parametrize(
+    ("track", "at_the_end", "refused"),
+    [(200.0, 10.0, False), (201.0, 10.0, True), (1000.0, 50.0, False), (10.0, 0.1, True)],
+)
+def test_a_plan_whose_end_damps_too_little_is_refused(
+    track: float, at_the_end: float, refused: bool
+) -> None:
+    """Flown: it swung at up to 4.8 m/s from 800 on, and at 16 m/s at 10 with no weight there."""
+    wanted = (("PLN_W_TRACK", track), ("PLN_W_VEL_N", at_the_end))
+    tuning = tuple((BY_NAME[name].path, value) for name, value in wanted)
+    words = f"PLN_W_TRACK {track:g} is to be at most 20 times PLN_W_VEL_N, {at_the_end:g}"
+    assert contradictions(tuned(CONFIG, tuning)) == ((words,) if refused else ())
+
+
 @pytest.mark.requirement("REQ-ARM-7")
 @pytest.mark.parametrize("name", ["FD_FAIL_R", "FD_FAIL_P"])
 @pytest.mark.parametrize(
