@@ -40,12 +40,14 @@ Unit: TypeAlias = Literal[
 Kind: TypeAlias = Literal[
     "off",
     "stuck",
+    "frozen",
     "garbage",
     "wrong",
     "slow",
     "delayed",
     "intermittent",
     "noisy",
+    "wandering",
     "drifting",
     "turning",
     "tilting",
@@ -73,10 +75,12 @@ class Fault:
     # weak: of the thrust that is left, or of the battery's charge; intermittent, duplicated,
     # reordered: of the time, or of the datagrams.
     share: Annotated[float, Range(0.0, 1.0)] = 0.5
-    # wrong, noisy, drifting: times what is usual for the unit; turning, tilting: deg/s.
+    # wrong, frozen, noisy, wandering, drifting: times what is usual for the unit; turning,
+    # tilting: deg/s.
     size: Annotated[float, Range(-1000.0, 1000.0)] = 1.0
     delay_ms: Annotated[float, Range(0.0, 10000.0, step=2.0)] = 200.0  # delayed; slow: of a motor
     rate_hz: Annotated[float, Range(0.1, 500.0)] = 5.0  # slow: of a sensor
+    forgets_s: Annotated[float, Range(0.001, 3600.0)] = 0.1  # wandering: its time constant
     jump_s: Annotated[float, Range(-3600.0, 3600.0)] = 0.5  # of the clock
 
     @property
@@ -107,10 +111,12 @@ class Fault:
 SENSORS: Final[tuple[Sensor, ...]] = get_args(Sensor)
 LINKS: Final = ("to vehicle", "to simulator")
 
-_RANDOM: Final = ("garbage", "intermittent", "noisy", "duplicated", "reordered")
+_RANDOM: Final = (
+    "frozen", "garbage", "intermittent", "noisy", "wandering", "duplicated", "reordered",
+)  # fmt: skip
 _SIGNAL: Final = ("off", "stuck", "garbage", "wrong", "slow", "delayed", "intermittent")
 # Of a sensor: what its numbers are, as opposed to its messages.
-_OF_NUMBERS: Final = ("noisy", "drifting")
+_OF_NUMBERS: Final = ("frozen", "noisy", "wandering", "drifting")
 _OF_A_FRAME: Final = ("turning", "tilting")
 _OF_MESSAGES: Final = ("off", "slow", "delayed", "intermittent")  # of sensors
 _LINK: Final = ("off", "delayed", "intermittent", "duplicated", "reordered")
@@ -118,7 +124,7 @@ _PROCESS: Final = ("stopped", "killed")
 KINDS: Final[dict[str, tuple[str, ...]]] = {
     **dict.fromkeys(SENSORS, (*_SIGNAL, *_OF_NUMBERS)),
     "vio": (*_SIGNAL, *_OF_NUMBERS, *_OF_A_FRAME),
-    "attitude": ("stuck", "garbage", "wrong", "noisy", *_OF_A_FRAME),
+    "attitude": ("stuck", "frozen", "garbage", "wrong", "noisy", "wandering", *_OF_A_FRAME),
     "battery": ("off", "weak"),
     "motor": (*_SIGNAL, "weak"),
     "joint": ("off", "stuck"),

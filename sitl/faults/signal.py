@@ -54,6 +54,7 @@ _NOISE: Final[dict[str, dict[str, float]]] = {
     "distance": {"distance": 0.1},
     "encoder": {"q_arm": 0.01, "angles": 0.01, "qd_arm": 0.1},
 }
+_FROZEN: Final = 0.01  # of it, on what is frozen
 _DRIFT: Final = 0.1  # 1/s, of what a wrong reading is off
 _FRAME_RATE: Final = math.radians(1.0)  # rad/s, of a frame that turns or tilts
 _WINDOW_US: Final = 100_000  # in which an intermittent unit is there or not
@@ -88,6 +89,8 @@ class SignalFault(Generic[M]):
         self._first_us: int | None = None  # of the readings that are spoilt
         self._under_way: deque[tuple[int, M]] = deque()
         self._windows = Windows(fault.share, random)
+        # Of each field, how far it has wandered, and when [s].
+        self._wandered: dict[str, tuple[float, list[float]]] = {}
 
     def read(self, t_us: int, reading: M) -> M | None:
         """What is said now of a ``reading`` at ``t_us`` [us]; None: nothing, or not yet."""
@@ -96,10 +99,14 @@ class SignalFault(Generic[M]):
             return None
         if fault.kind == "intermittent":
             return None if self._windows.silent(t_us) else reading
-        if fault.kind == "stuck":
+        if fault.kind in ("stuck", "frozen"):
             if self._kept is None:
                 self._kept = reading
-            return self.merged(reading, self._kept)
+            kept = self._kept
+            if fault.kind == "frozen":
+                names = self._names(reading)
+                kept = _replaced(kept, {n: self._noisy(n, getattr(kept, n)) for n in names})
+            return self.merged(reading, kept)
         if fault.kind == "slow":
             if t_us < self._next_us:
                 return None
@@ -158,6 +165,8 @@ class SignalFault(Generic[M]):
             return self._garbage(name, value)
         if kind == "noisy":
             return self._noisy(name, value)
+        if kind == "wandering":
+            return self._off(name, value, self._wander(name, value, since_s))
         if kind in ("turning", "tilting"):
             down, angle = kind == "turning", size * _FRAME_RATE * since_s
             if name == "q_WB":
@@ -178,15 +187,36 @@ class SignalFault(Generic[M]):
         return tuple(v + size * off for v, off in zip(value, offsets, strict=False))
 
     def _noisy(self, name: str, value: Any) -> Any:
+        return self._off(name, value, self._drawn(name, value))
+
+    def _drawn(self, name: str, value: Any) -> list[float]:
+        """What white noise adds to each number of a field; of an attitude, about each axis."""
         deviation = abs(self.fault.size) * _NOISE[self.fault.unit].get(name, 0.0)
-        if deviation == 0.0:
+        if self.fault.kind == "frozen":
+            deviation = _FROZEN * (deviation or _NOISE["attitude"].get(name, 0.0))
+        count = 3 if name == "q_WB" else len(value) if isinstance(value, tuple) else 1
+        return list(normal(self._random, deviation, count)) if deviation else [0.0] * count
+
+    def _wander(self, name: str, value: Any, since_s: float) -> list[float]:
+        """How far a field is off of noise that forgets itself slowly, ``since_s`` [s]."""
+        drawn = self._drawn(name, value)
+        at, before = self._wandered.get(name, (since_s, drawn))
+        keeps = math.exp((at - since_s) / self.fault.forgets_s)
+        new = math.sqrt(1.0 - keeps * keeps)
+        off = [keeps * old + new * more for old, more in zip(before, drawn, strict=True)]
+        self._wandered[name] = since_s, off
+        return off
+
+    @staticmethod
+    def _off(name: str, value: Any, off: list[float]) -> Any:
+        """A reading that is ``off`` in each of its numbers."""
+        if not any(off):
             return value
         if name == "q_WB":
-            return turned(value, tuple(normal(self._random, deviation, 3)))
+            return turned(value, tuple(off))
         if not isinstance(value, tuple):
-            return value + normal(self._random, deviation, 1)[0]
-        drawn = normal(self._random, deviation, len(value))
-        return tuple(v + more for v, more in zip(value, drawn, strict=True))
+            return value + off[0]
+        return tuple(v + more for v, more in zip(value, off, strict=True))
 
     def _garbage(self, name: str, value: Any) -> Any:
         if name == "q_WB":

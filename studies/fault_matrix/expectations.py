@@ -62,7 +62,16 @@ class _Table:
     link: bool = False
 
 
-_NUMBERS: Final = ("duration_s", "share", "size", "axis", "delay_ms", "rate_hz", "jump_s")
+_NUMBERS: Final = (
+    "duration_s",
+    "share",
+    "size",
+    "axis",
+    "delay_ms",
+    "rate_hz",
+    "forgets_s",
+    "jump_s",
+)
 _EXPECTED: Final = tuple(one.name for one in fields(Expectation))
 _OWN: Final = tuple(one.name for one in fields(_Table))
 _KNOWN: Final = (*_OWN, "with", "in", *_NUMBERS, *_EXPECTED)

@@ -133,9 +133,10 @@ def _fault(random: np.random.Generator, latest_s: float) -> Fault:
         "instance": float(random.integers(unit == "motor", most + 1)) if most else 0.0,
         "axis": float(random.integers(4)) if unit in _AXES and random.random() < 0.5 else 0.0,
         "share": round(float(random.uniform(0.05, 0.95)), 2),
-        "size": sign * between(*((0.5, 10.0) if kind == "noisy" else (0.1, 5.0))),
+        "size": sign * between(*_SIZES.get(kind, (0.1, 5.0))),
         "delay_ms": 2.0 * round(between(5.0, 500.0)),
         "rate_hz": between(0.5, 50.0),
+        "forgets_s": between(0.02, 2.0),
         # What passes the link; it makes an even time of longer ones, and in process there is none.
         "jump_s": float(random.choice((-1.0, 1.0))) * between(0.002, 0.05),
     }
@@ -145,11 +146,13 @@ def _fault(random: np.random.Generator, latest_s: float) -> Fault:
     return Fault(unit, kind, **{name: drawn[name] for name in used})
 
 
-_SIZED: Final = ("wrong", "noisy", "drifting", "turning", "tilting")
+_SIZED: Final = ("wrong", "noisy", "wandering", "drifting", "turning", "tilting")
+_SIZES: Final = {"noisy": (0.5, 10.0), "wandering": (0.5, 50.0)}
 _USED: Final[dict[str, tuple[str, ...]]] = {
     **dict.fromkeys(_SIZED, ("size",)),
     **dict.fromkeys(("weak", "intermittent"), ("share",)),
     "slow": ("rate_hz",),
+    "wandering": ("size", "forgets_s"),
     "jump": ("jump_s",),
 }
 

@@ -165,3 +165,18 @@ def test_the_wind_that_a_wrong_accelerometer_makes_up_is_not_leaned_against(seed
     assert "descend" in flight.actions
     assert flight.away_m is not None
     assert flight.away_m < 11.4, "2 m/s by then, and the rest by the wrong speed that it brakes"
+
+
+@pytest.mark.drawn(2)
+@pytest.mark.requirement("REQ-EST-13")
+@pytest.mark.parametrize("mode", ["trajectory", "mission"])
+@pytest.mark.parametrize("seed", [40, *(pytest.param(k, marks=in_long) for k in range(41, 50))])
+def test_what_a_pose_teaches_that_freezes_for_a_moment_is_taken_back(mode: str, seed: int) -> None:
+    """Biases of 0.8 rad/s were left, and the good poses after it were refused until a wall."""
+    random = np.random.default_rng((seed, len(mode)))
+    lasts = float(random.uniform(0.25, 0.6))
+    flight = fly(mode, (Fault("vio", "frozen", duration_s=lasts),), "mocap", seed)
+    assert flight.contact == "", flight.ended
+    assert flight.least_m is not None
+    assert flight.least_m > 0.0
+    assert any("pose" in said.text for said in flight.warnings)

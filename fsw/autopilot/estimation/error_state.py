@@ -109,6 +109,8 @@ FILTER: Final = np.dtype(
         ("leaning", float, (4, 3, ROWS)),
         ("leant_at", float),
         ("innovated_at", float, (4,)),  # s, of the last one
+        # From when until when [s] poses were wrong that later ones have refuted, if there were any.
+        ("refuted", float, (2,)),
         ("lost", np.int64),  # which halves of the state's own reading are of no use
         # Joints, at a time of their own (joint_filter.py), and what torques made of them since.
         ("joint_count", np.int64),  # of the vehicle

@@ -10,16 +10,14 @@ Source: J. Solà, Quaternion kinematics for the error-state Kalman filter, 2017,
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, Final
 
 from fsw.autopilot.estimation.error_state import (
     BA,
-    BG,
     DELAY,
     LAGS,
     NO_HEADING,
     NOTHING,
-    TH,
     Filter,
     P,
     V,
@@ -27,7 +25,7 @@ from fsw.autopilot.estimation.error_state import (
     distance,
     reset_covariance,
 )
-from fsw.autopilot.geometry.rotation import matrix_from_quaternion, rotate_back
+from fsw.autopilot.geometry.rotation import matrix_from_quaternion
 from fsw.autopilot.geometry.vectors import (
     ZERO,
     add,
@@ -42,10 +40,7 @@ from fsw.autopilot.geometry.vectors import (
 from fsw.autopilot.signals import Vec3
 from fsw.compiled import compilable, kernel, machine_code
 
-# What is not known of a state that poses contradict: standard deviations.
-_DOUBTED_SPEED = 0.5  # m/s
-_DOUBTED_FORCE = 3.0  # m/s^2
-_DOUBTED_RATE = 0.5  # rad/s
+REFUTED_FOR: Final = 2.0  # s; poses that were refuted so lately make nobody else doubted
 # Of the chi-square of a part whose other part is refused.
 _DOUBTED_GATE = 0.05
 # Of how a variance follows the noise that there is with each measurement, and by at most so much.
@@ -64,6 +59,9 @@ _LEAPS = 4.5  # deviations, and what a force makes from one to the next: no grow
 _SUM, _LAST, _LEAPT = 0, 1, 2  # what is remembered of each kind
 _MIN_SCATTER = 0.14  # a receiver knows its velocity better than it is believed, by at most that
 _EXPLAINED = NOTHING | NO_HEADING  # who may be wrong then without a force's being so
+# What is not known of a state that poses contradict by little: standard deviations.
+_DOUBTED_PLACE: Final = 0.05  # m
+_DOUBTED_SPEED: Final = 0.5  # m/s
 # What is not known of a force then, for how long it has been so, and how well that is known.
 _LEANT_FORCE = 3.0  # m/s^2
 _LEANT_FOR = 0.2  # s
@@ -121,7 +119,8 @@ def judged(
             x.variance[k] *= max(x.noise_scale[scaled], 1.0)
     gate *= _DOUBTED_GATE if doubted else 1.0
     ratio = distance(x, rows) / gate
-    if scaled >= 0 and not doubted and _leans(x, scaled) and not x.suspect & _EXPLAINED:
+    leans = scaled >= 0 and not doubted and _leans(x, scaled) and not x.suspect & _EXPLAINED
+    if leans and x.time - x.refuted[1] > REFUTED_FOR:
         _doubt_force(x)
         for k in range(rows):
             x.residual[k] = x.innovation[part, k]
@@ -310,39 +309,13 @@ def forget(x: Any, first: int, variance: Vec3) -> None:
 
 @machine_code
 @kernel
-def doubt(filters: Filter, along: Vec3, about: Vec3, place: float, turn: float, held: bool) -> None:
-    """Know little more of a state that poses contradict by a ``place`` [m] and a ``turn`` [rad].
+def doubt_force(filters: Filter) -> None:
+    """Know little more of a state whose place poses contradict, and whose attitude they do not.
 
-    Either the pose's frame has moved, or the inertial unit leads the filter astray: its biases may
-    be anything, and velocity and attitude are what they have made of them. They have made what is
-    contradicted, a place that is off ``along`` [m, NED], by a force or a tilt, and an attitude that
-    is off ``about`` an axis [rad, body]: nothing is doubted across. What is off by little, by a
-    ``place``, may be so by chance, in any direction. But where poses do not say how the vehicle is
-    turned, ``held``, their places would be explained by any attitude.
+    By little, which may be chance in any direction: the accelerometer may have led it there.
     """
-    x = filters[0]
-    M, R = x.covariance, matrix_from_quaternion(four(x.q))
-    north, east, down = _unit(along)
-    level, up = (north, east, 0.0), (0.0, 0.0, down)
-    tilt, spin = rotate_back(R, (-east, north, 0.0)), _unit(about)
-    force, lift = rotate_back(R, level), rotate_back(R, up)
+    M = filters[0].covariance
     for i in range(3):
-        for j in range(3):
-            moved = level[i] * level[j] + up[i] * up[j]
-            pushed = force[i] * force[j] + lift[i] * lift[j]
-            turned = tilt[i] * tilt[j] + spin[i] * spin[j]
-            if place > 0.0:
-                moved = pushed = turned = 1.0 if i == j else 0.0
-            M[P + i, P + j] += place * place * moved
-            M[V + i, V + j] += _DOUBTED_SPEED * _DOUBTED_SPEED * moved
-            if not held:
-                continue
-            M[TH + i, TH + j] += turn * turn * turned
-            M[BA + i, BA + j] += _DOUBTED_FORCE * _DOUBTED_FORCE * pushed
-            M[BG + i, BG + j] += _DOUBTED_RATE * _DOUBTED_RATE * turned
-
-
-@compilable
-def _unit(v: Vec3) -> Vec3:
-    """The direction of a vector ``v`` [any], or none where it is none."""
-    return add_scaled(ZERO, v, 1.0 / max(norm(v), 1e-9))
+        M[P + i, P + i] += _DOUBTED_PLACE * _DOUBTED_PLACE
+        M[V + i, V + i] += _DOUBTED_SPEED * _DOUBTED_SPEED
+        M[BA + i, BA + i] += _LEANT_FORCE * _LEANT_FORCE

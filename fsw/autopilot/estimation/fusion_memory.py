@@ -103,6 +103,7 @@ class FusionMemory:
     newest_field: MagneticSample | None = None
     verdict: Verdict = Verdict()  # on who is wrong
     replays: int = 0  # how often the filter went back to do without a sensor
+    asked: float = -math.inf  # s, when it was last whether refused poses refute those before
 
     def of(self, sensor: Sensor) -> Health:
         """What is known of a sensor."""
@@ -213,5 +214,5 @@ def at_start(joints: int, turns: Sequence[float] = (1.0,) * 4) -> FusionMemory:
     """
     x = np.ndarray(1, FILTER, bytearray(FILTER.itemsize))
     x["joint_count"], x["turns"] = joints, turns
-    x["model_walk"], x["scatter"] = MIN_WALKS, 1.0
+    x["model_walk"], x["scatter"], x["refuted"] = MIN_WALKS, 1.0, -math.inf
     return FusionMemory(x)

@@ -25,7 +25,7 @@ from fsw.autopilot.estimation.faults.arbitration import Arbitration, begun
 from fsw.autopilot.estimation.faults.confirmation import Run, ended, extended
 from fsw.autopilot.estimation.faults.residuals import EVIDENCE, NO_AID
 from fsw.autopilot.estimation.faults.sensor_fault import Health, SensorFault
-from fsw.autopilot.estimation.faults.sources import Source
+from fsw.autopilot.estimation.faults.sources import AM, Source
 from fsw.autopilot.estimation.faults.verdict import Verdict
 from fsw.autopilot.estimation.filter_start import FilterStart
 from fsw.autopilot.estimation.fusion_memory import (
@@ -56,7 +56,7 @@ from fsw.autopilot.estimation.sensors.pose import Pose, is_attitude_stuck
 from fsw.autopilot.estimation.tuning import EstimatorTuning
 from fsw.autopilot.geometry.quaternion import conjugate, multiply
 from fsw.autopilot.geometry.rotation import matrix_from_quaternion, rotate_back
-from fsw.autopilot.geometry.vectors import ZERO, add_scaled, norm, three
+from fsw.autopilot.geometry.vectors import add_scaled, norm
 from fsw.autopilot.measurements import (
     AidingSample,
     GnssSample,
@@ -79,6 +79,7 @@ _MARGIN: Final = 0.003  # s, by which a measurement may take longer than lately
 _LONGEST_STEP: Final = 0.05  # s, by which joints are predicted at once
 # A pose that is refused by no more says nothing of itself at first: the inertial unit may have been
 # wrong by as much before it is found out.
+_FELT: Final = 0.3
 _SMALL_STEP: Final = 0.05  # m
 _SMALL_TURN: Final = 0.1  # rad
 # A frame that has been moved is level to so much, and the filter to so many deviations.
@@ -120,7 +121,7 @@ class SensorFusion:
         assert estimate is not None
         for sensor in self._sensors.values():
             sensor.take(memory, sensor.at_rest, t, (2.0, 2.0))
-        fusion.doubt(memory.numbers, ZERO, ZERO, 0.0, 0.0, True)
+        fusion.doubt_force(memory.numbers)
         residuals.look(np.zeros(1, EVIDENCE), memory.numbers, t, NO_AID, NO_AID, NO_AID, False)
         self.covariance(memory, t)
         return estimate
@@ -372,7 +373,8 @@ class SensorFusion:
         """Fuse the first of the waiting samples, whose time the filter has."""
         one, now = memory.waiting[0], memory.now
         sample, sensor = one.sample, self._sensors[type(one.sample)]
-        if sensor.source is Source.COMPASS and memory.verdict.suspects & Source.COMPASS:
+        heads = sensor.source is Source.COMPASS and memory.verdict.suspects & Source.COMPASS
+        if heads or _is_refuted(memory, sample):
             # A heading that may be wrong is not needed, and turns what else is measured. It may be
             # so since it has come.
             return replace(memory, waiting=memory.waiting[1:])
@@ -468,9 +470,13 @@ class SensorFusion:
             if announced or long_refused or not little:
                 health = health.with_fault(SensorFault.JUMP, now)
             parts = [1.0 < r < math.inf for r in ratio]
-            if little and not (announced or run.stepped) and run.is_no_noise(parts):
+            lately = now - float(memory.numbers["refuted"][0, 1]) < fusion.REFUTED_FOR
+            # What turned as the gyro says, and moved as no force says, is the accelerometer's.
+            moves = parts == [True, False] and not (announced or run.stepped or lately)
+            moves = moves and _is_felt(memory)
+            if little and moves and run.is_no_noise(parts):
                 before = memory.numbers[0].copy()
-                self._doubt(memory, ratio, innovation, _SMALL_STEP, _SMALL_TURN)
+                fusion.doubt_force(memory.numbers)
                 ratio = sensor.fuse(memory, sample, one.half)
                 memory = memory.led(_jump(before, memory.numbers[0])[0])
         fused = health.fused or (now,) * len(ratio)
@@ -489,9 +495,6 @@ class SensorFusion:
             memory = replace(memory, reset_counter=counter)
         if run is not None and believed and any(1.0 < r < math.inf for r in ratio):
             memory = sensor.take(memory, sample, one.time, ratio)
-            if not (announced or run.stepped) and isinstance(sample, PoseSample):
-                # Either the frame has moved, or the inertial unit lies.
-                self._doubt(memory, ratio, innovation, 0.0, 0.0)
             taken = zip(fused, ratio, strict=True)
             fused = tuple([now if r < math.inf else before for before, r in taken])
             # The estimate is there now: this one was used, and the next run begins anew.
@@ -502,21 +505,6 @@ class SensorFusion:
         elif previous is not None and not refused:
             memory = memory.jumped(*_jump(previous, memory.numbers[0]), expected=True)
         return memory
-
-    def _doubt(
-        self,
-        memory: FusionMemory,
-        ratio: tuple[float, ...],
-        innovation: tuple[float, ...],
-        place: float,
-        turn: float,
-    ) -> None:
-        """Doubt what an inertial unit may have made of a pose's refused parts."""
-        along, about = [
-            three(innovation, at) if 1.0 < r < math.inf else ZERO
-            for at, r in zip((0, 3), ratio, strict=True)
-        ]
-        fusion.doubt(memory.numbers, along, about, place, turn, max(ratio) < math.inf)
 
     def _run(
         self,
@@ -546,6 +534,8 @@ class SensorFusion:
             return False
         if last is None or len(before) < 3 or not 0.0 < sample.time - last.time < _SOON:
             return False
+        if memory.of(Sensor.POSE).ratio[0] > 1.0:
+            return False  # that one was off itself
         sigma = self._pose.deviations(memory, self._pose.noise(memory, sample))[0]
         noise = self.tuning.pose.gate * math.sqrt(2.0) * sigma
         room = noise + CREEPS * (sample.time - last.time)
@@ -594,6 +584,18 @@ def _fault_of_encoders(sample: JointSample, now: float, came: float) -> SensorFa
     if sample.time < now - ENCODERS_TOO_OLD:
         return SensorFault.TOO_OLD
     return SensorFault.RATE_TOO_LOW if now - came > ENCODERS_TOO_OLD else SensorFault.NONE
+
+
+def _is_refuted(memory: FusionMemory, sample: AidingSample) -> bool:
+    """Whether it is of a time of which later poses have refuted those that came."""
+    since, until = memory.numbers["refuted"][0].tolist()
+    return isinstance(sample, PoseSample) and since <= sample.time < until
+
+
+def _is_felt(memory: FusionMemory) -> bool:
+    """Whether rotors do not contradict that the force that is felt is off."""
+    evidence = memory.verdict.evidence
+    return evidence is None or not 0.0 < evidence["ratio"][0, AM] <= _FELT
 
 
 def _is_small(sample: AidingSample, innovation: tuple[float, ...]) -> bool:

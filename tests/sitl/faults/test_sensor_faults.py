@@ -7,10 +7,12 @@ import statistics
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from sitl.faults.active import Faults
 from sitl.faults.keys import EXACT, KINDS, SENSORS, Fault, Kind, Unit, problem
+from sitl.faults.signal import SignalFault
 from sitl.sensors.barometer import PressureMeasurement
 from sitl.sensors.channel import Measurement
 from sitl.sensors.encoders import JointMeasurement
@@ -227,6 +229,31 @@ def test_unstated_noise_of_poses_has_the_deviation_that_is_asked_for_in_mm() -> 
     assert statistics.pstdev(off) == pytest.approx(0.003, rel=0.1)
     assert statistics.mean(off) == pytest.approx(0.0, abs=0.0005)
     assert all(sent[step].q_WB == exact(step).q_WB for step in range(FIRST, END))
+
+
+def test_a_frozen_sensor_is_where_it_was_and_repeats_nothing() -> None:
+    sent = frames(failing("vio", "frozen"))[FIRST:END]
+    assert len({frame.p_WB for frame in sent}) == len({frame.q_WB for frame in sent}) == len(sent)
+    for frame in sent:
+        assert frame.p_WB == pytest.approx(exact(FIRST).p_WB, abs=1e-4)
+        assert frame.q_WB == pytest.approx(exact(FIRST).q_WB, abs=1e-3)
+
+
+def test_what_wanders_forgets_itself_in_the_time_that_is_asked_for() -> None:
+    steps, forgets = 20_000, 0.05
+    fault = SignalFault[SensorReadings](
+        replace(failing("vio", "wandering"), size=4.0, forgets_s=forgets), np.random.default_rng(1)
+    )
+    reading, off = exact(0), []
+    for step in range(steps):
+        said = fault.read(2000 * step, reading)
+        assert said is not None
+        off.append([a - b for a, b in zip(said.p_WB, reading.p_WB, strict=True)])
+    x = np.array(off)
+    assert x.std() == pytest.approx(0.004, rel=0.1)
+    lag = round(forgets / 0.002)
+    assert (x[lag:] * x[:-lag]).mean() / x.var() == pytest.approx(math.exp(-1.0), abs=0.1)
+    assert said.q_WB == reading.q_WB
 
 
 def test_a_drift_grows_with_time_and_its_velocity_fits() -> None:

@@ -36,17 +36,20 @@ from fsw.autopilot.estimation.error_state import (
     watch_biases,
 )
 from fsw.autopilot.estimation.faults import residuals
+from fsw.autopilot.estimation.faults.confirmation import Run
 from fsw.autopilot.estimation.faults.residuals import LASTS, NO_AID
 from fsw.autopilot.estimation.faults.sensor_fault import SensorFault
-from fsw.autopilot.estimation.faults.sources import NOBODY, Source
+from fsw.autopilot.estimation.faults.sources import AM, GM, NOBODY, Source
 from fsw.autopilot.estimation.faults.verdict import UNDECIDED, Verdict, judged, lifted
 from fsw.autopilot.estimation.fusion import clear
 from fsw.autopilot.estimation.fusion_memory import FusionMemory, TickInputs, Trail, copied
 from fsw.autopilot.estimation.imu import IMU_SILENT, is_stuck
 from fsw.autopilot.estimation.joint_filter import ENCODERS_TOO_OLD
 from fsw.autopilot.estimation.sensors.base import AidingSensor, attitude_of
+from fsw.autopilot.geometry.quaternion import conjugate, multiply, normalised, rotation_vector
 from fsw.autopilot.geometry.rotation import matrix_from_quaternion
-from fsw.autopilot.measurements import Sensor
+from fsw.autopilot.geometry.vectors import add_scaled, three
+from fsw.autopilot.measurements import PoseSample, Sensor
 from fsw.autopilot.model.airframe import GRAVITY
 from fsw.autopilot.signals import StateEstimate, Vec2
 from fsw.frozen import replace
@@ -60,7 +63,8 @@ _FOR: Final = (0.1, 0.06)
 _TURNED: Final = 0.6  # s
 _SEEN_OF_TURN: Final = 1.0 / 3.0
 _SEEN: Final = (0.5, 1.0)
-_IS_WHAT_IT_WAS: Final = 16.3  # chi-square, exceeded by chance once in a thousand
+_IS_WHAT_IT_WAS: Final = 3.0  # chi-square, of what may have walked on for half a second since
+_BORNE_OUT: Final = 0.5  # of a threshold
 _HALVES: Final = ((Source.ACCELEROMETER, NO_FORCE), (Source.GYRO, NO_RATE))
 _USED: Final = 0.5  # s; what was refused for longer finds no bias
 _LASTED: Final = 0.05  # s, of integrals
@@ -74,6 +78,10 @@ _PARTS: Final = {
 }
 # Of encoders that are used all the same.
 _FOLLOWED: Final = (SensorFault.RATE_TOO_LOW, SensorFault.NOISY)
+_ASKS_EVERY: Final = 0.1  # s; going back takes as long as four ticks
+# By so much nearer poses must be to what refutes those before.
+_NEARER: Final = 0.3
+_OWN: Final = (0.005, 0.01)  # m, rad; or no farther than what poses and units make of themselves
 _ROUNDING: Final = 1e-9  # s
 
 Again = Callable[[FusionMemory, TickInputs], tuple[FusionMemory, StateEstimate | None]]
@@ -111,6 +119,9 @@ class Arbitration:
             return begun(memory), found
         if not self.is_due(memory):
             return memory, found
+        memory, refuted = self._refuted(memory)
+        if refuted is not None:
+            return memory, refuted
         before = memory.verdict
         memory = _lifted(memory, found, flies=flies, known=damaged or touches)
         if memory.verdict.wrong is not before.wrong:
@@ -217,10 +228,53 @@ class Arbitration:
         x["believed"] = NOTHING if believes else 0
         if new & _UNIT:
             memory = memory.noting_fault(Sensor.IMU, SensorFault.DISAGREES, now)
-        return self._replayed(memory, found)
+        memory, state = self._replayed(memory, found)
+        if state is None:
+            return memory, state
+        # What the estimate was down when it was measured last was as wrong as it is now.
+        (v, p), verdict = memory.verdict.seen_down, memory.verdict
+        v, p = v + state.v_WB[2] - found.v_WB[2], p + state.p_WB[2] - found.p_WB[2]
+        return replace(memory, verdict=verdict._replace(seen_down=(v, p))), state
+
+    def _refuted(self, memory: FusionMemory) -> tuple[FusionMemory, StateEstimate | None]:
+        """The memory without what poses have taught that are refuted by later ones, and its state.
+
+        Poses that are refused, and are where the inertial unit alone leads from before all that the
+        filter can go back to, refute those in between. None: these do not.
+        """
+        oldest = memory.trail_before or memory.trail
+        run = next((one for one in memory.runs if one.kind is PoseSample), None)
+        if run is None or oldest is None or run.since <= oldest.began:
+            return memory, None
+        if not run.is_no_chance or memory.now - memory.asked < _ASKS_EVERY:
+            return memory, None
+        memory = replace(memory, asked=memory.now)
+        numbers = memory.numbers.copy()
+        numbers["refuted"] = oldest.began, math.inf
+        without, state = self._replayed(replace(memory, numbers=numbers), None)
+        verdict = without.verdict.acquitted()
+        if state is None or verdict.evidence is None or not _refutes(run, memory.pose, without):
+            return memory, None
+        without.numbers["refuted"] = oldest.began, run.since
+        evidence = copied(verdict.evidence)
+        residuals.forget_poses(evidence)
+        without.numbers["suspect"] = 0
+        without = replace(
+            without,
+            verdict=verdict._replace(evidence=evidence),
+            health=memory.health,
+            pose=memory.pose,
+            reset_counter=memory.reset_counter,
+            runs=(),
+        )
+        if memory.pose is not None and memory.pose.drifts:
+            # What the inertial unit is off by meanwhile would be taken for a drift of the frame.
+            sensor = self._sensors[PoseSample]
+            without = sensor.take(without, memory.pose, memory.pose.time, (2.0, 1.0))
+        return without.noting_fault(Sensor.POSE, SensorFault.DISAGREES, memory.now), state
 
     def _replayed(
-        self, memory: FusionMemory, found: StateEstimate
+        self, memory: FusionMemory, found: StateEstimate | None
     ) -> tuple[FusionMemory, StateEstimate | None]:
         """Go back to before sensors contradicted, and do without what is wrong since then."""
         trails = [one for one in (memory.trail_before, memory.trail) if one is not None]
@@ -231,7 +285,7 @@ class Arbitration:
             return memory, found
         back, state = trails[0].start, None
         numbers = back.numbers.copy()
-        for name in ("out", "suspect"):
+        for name in ("out", "suspect", "refuted"):
             numbers[name] = x[name]
         numbers["believed"] = believed
         back = replace(back, numbers=numbers, verdict=memory.verdict)
@@ -245,7 +299,7 @@ class Arbitration:
         for name in ("witness", "model_walk"):
             numbers[name] = memory.numbers[name]
         fused = [(one, back.of(one.sensor)) for one in memory.health]
-        start = replace(
+        without = replace(
             memory,
             numbers=numbers,
             health=tuple([a.with_fused(b.fused, b.ratio, b.innovation) for a, b in fused]),
@@ -255,11 +309,28 @@ class Arbitration:
             pose=back.pose,
             reset_counter=back.reset_counter,
             frame=back.frame,
+            unproven=back.unproven,
             replays=memory.replays + 1,
-            trail=None,
-            trail_before=None,
         )
-        return replace(start, trail=Trail(start, memory.now)), state
+        return without, state
+
+
+def _refutes(run: Run, pose: PoseSample | None, without: FusionMemory) -> bool:
+    """Whether the last ``pose`` of a ``run`` is nearer to the memory ``without`` any.
+
+    By far, in each part that contradicts the one with them.
+    """
+    if pose is None:
+        return False
+    x = without.numbers[0]
+    place = add_scaled(three(x["p"], 0), three(x["v"], 0), pose.time - float(x["time"]))
+    turn = rotation_vector(multiply(conjugate(attitude_of(x)), normalised(pose.attitude)))
+    left = math.dist(pose.position, place), math.hypot(*turn)
+    off = math.hypot(*run.innovation[:3]), math.hypot(*run.innovation[3:])
+    nearer = [now <= _NEARER * before for now, before in zip(left, off, strict=True)]
+    return any(nearer) and all(
+        one or now <= own for one, now, own in zip(nearer, left, _OWN, strict=True)
+    )
 
 
 def begun(memory: FusionMemory) -> FusionMemory:
@@ -393,7 +464,7 @@ def _widened(x: Any, verdict: Verdict, aided: Source) -> Verdict:
         x["model_walk"][half] = min(x["model_walk"][half], size)
         grown = size**2 - unknown[half] ** 2
         if not aided and unknown[half]:
-            _recall(x, bias)
+            _recall(x, bias, shown=bool(verdict.evidence["ratio"][0, (AM, GM)[half]] > _BORNE_OUT))
             unknown[half] = 0.0
         elif aided and grown > 0.0:
             if not unknown[half]:
@@ -407,9 +478,10 @@ def _widened(x: Any, verdict: Verdict, aided: Source) -> Verdict:
     return verdict._replace(unknown=(unknown[0], unknown[1]))
 
 
-def _recall(x: Any, bias: int) -> None:
+def _recall(x: Any, bias: int, *, shown: bool) -> None:
     """Take a ``bias`` [BA, BG] of ``x`` for what it was, unless it has been found to be another.
 
+    That rotors have ``shown`` too: else a pose that is wrong has taught it.
     As a measurement, because what is known of it has led to a tilt and a velocity.
     """
     clear(x, 3)
@@ -417,7 +489,7 @@ def _recall(x: Any, bias: int) -> None:
         x.H[i, bias + i] = 1.0
         k = bias - BA + i
         x.residual[i], x.variance[i] = x.kept_bias[k] - x.bias[k], x.kept_variance[k]
-    if distance(x, 3) <= _IS_WHAT_IT_WAS:
+    if distance(x, 3) <= (_IS_WHAT_IT_WAS if shown else math.inf):
         correct(x, 3)
 
 

@@ -85,6 +85,7 @@ _MEAN: Final = 0.5  # s
 # For so long [s] a reading is in a window, or in the one before it.
 CONTAINED: Final = (*(2.0 * window for window in WINDOWS), _LONG + 2.0 * _MEAN)
 _ROWS: Final = 256  # looks: 5 s
+_STANDS: Final = 0.3  # s
 _AIDS: Final = 256  # measurements of a kind, at most one a look
 _MEASURED: Final = 1  # column of what is measured, after the time: place and attitude, for example
 _AT: Final = 8  # column of the integrals at its time
@@ -163,6 +164,7 @@ EVIDENCE: Final = np.dtype(
         ("apart", float),
         ("across", float, (5,)),
         ("headed", float, (COUNT,)),
+        ("noise", float, (2,)),  # of the last pose: m, rad
         ("tipped", float),  # s, when gyro and poses that come seldom differed by a tilt
     ],
     align=True,
@@ -198,6 +200,32 @@ def note_silence(evidence: Evidence, silent: Source, now: float) -> Source:
             last[place] = now
     lately = [now - at < CONTAINED[0] for at in last.tolist()]
     return Source(sum([1 << place for place, lost in enumerate(lately) if lost]))
+
+
+def forget_poses(evidence: Evidence) -> None:
+    """Compare poses that come from now on with no earlier ones."""
+    s = evidence[0]
+    s["aid_first"][0], s["waits"][0] = s["aid_count"][0], 0
+    s["came"][[k for k in range(COUNT) if _KINDS[k] == 0]] = -1.0
+
+
+def pose_stands(evidence: Evidence) -> bool:
+    """Whether poses have neither moved nor turned by more than their noise lately."""
+    s, most = evidence[0], math.sqrt(2.0) * _NOISE_SIGMAS
+    last = int(s["aid_count"][0]) - 1
+    newest = s["aids"][0, last % _AIDS]
+    for k in range(last - 1, max(int(s["aid_first"][0]), last - _AIDS) - 1, -1):
+        row = s["aids"][0, k % _AIDS]
+        turn = rotation_vector(
+            multiply(conjugate(four(row, _MEASURED + 3)), four(newest, _MEASURED + 3))
+        )
+        if math.dist(three(row, _MEASURED), three(newest, _MEASURED)) > most * s["noise"][0]:
+            return False
+        if norm(turn) > most * s["noise"][1]:
+            return False
+        if newest[0] - row[0] > _STANDS:
+            return True
+    return False
 
 
 def size_of(evidence: Evidence, source: Source) -> float:
@@ -293,6 +321,8 @@ def look(
     for i in range(WITNESS):
         row[1 + i] = x.witness[i]
     s.count += 1
+    if pose[0]:
+        s.noise[0], s.noise[1] = pose[4], pose[5]
     kept = _take(s, 0, pose), _take(s, 1, fix), _take(s, 2, field)
     if now - s.began < _SETTLING:
         return

@@ -17,7 +17,7 @@ from __future__ import annotations
 import math
 from typing import Final, NamedTuple
 
-from fsw.autopilot.estimation.faults.residuals import CONTAINED, Evidence
+from fsw.autopilot.estimation.faults.residuals import CONTAINED, Evidence, pose_stands
 from fsw.autopilot.estimation.faults.sources import (
     AA,
     AM,
@@ -196,6 +196,8 @@ def judged(
     if leader and leader is verdict.leader:
         total += verdict.sum
     named = leader if total > _SURE else NOBODY
+    if named is Q and verdict.evidence is not None and pose_stands(verdict.evidence):
+        named = P
     # What the rotors have been named for shows in some windows for longer than in others.
     explained = explained or named is M
     verdict = verdict._replace(

@@ -351,3 +351,11 @@ def test_an_attitude_that_turns_is_told_among_outliers() -> None:
     turning = last(turns)
     assert turning.verdict.suspects & Source.ATTITUDE
     assert not any(memory.verdict.is_on for memory in hovering(apart=10, outliers=100))
+
+
+@pytest.mark.requirement("REQ-EST-13")
+def test_a_gyro_that_goes_wrong_beside_an_outlier_is_named() -> None:
+    """Poses said nothing from one outlier on, rotors and gyro were left, and a vehicle fell."""
+    beside = round(WRONG_FROM / TICK) + 35
+    memory = last(hovering(turns=0.4, outliers=beside))
+    assert memory.verdict.wrong is Source.GYRO
